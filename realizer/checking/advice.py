@@ -1,7 +1,7 @@
 """Advice on valid blocks that look like mistakes."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +24,7 @@ from bml_schema.node_schema import local, schema_of
 from bml_schema.source import Source
 from bml_schema.tolerant_scanner import Element
 from realizer.behaviours.gaze_targets import is_known
+from realizer.checking.document import CheckedBlock
 from realizer.checking.explain import near
 from realizer.checking.finding import Finding, Label
 from realizer.knowledge.advice import VisibleExpression, advise
@@ -31,7 +32,6 @@ from realizer.knowledge.enrich import template_of
 from realizer.knowledge.word_languages import Words
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
-from realizer.speech.utterance import Utterance
 from realizer.speech.words import words_in
 from realizer.tables.knowledge import Mood, Role
 
@@ -179,21 +179,17 @@ def _minutes(seconds: float) -> str:
 
 
 def advise_on_behaviours(
-    file: str,
-    source: Source,
-    block: Block,
-    schedule: Schedule,
-    utterances: Mapping[str, Utterance],
-    role: Role,
-    mood: Mood | None,
-    lists: Words,
+    file: str, source: Source, part: CheckedBlock, role: Role, mood: Mood | None, lists: Words
 ) -> Iterator[Finding]:
     """Yield advice on expressions whose duration, order or words are unusual for people.
 
     Args:
-        utterances: speech id -> utterance.
+        part: a block with its schedule.
         lists: lists of emotional words.
     """
+    block, schedule, utterances = part.block, part.schedule, part.utterances
+    assert block is not None
+    assert schedule is not None
     seen = [
         VisibleExpression(node.id, template, (start + peak) / 2, (relax + end) / 2)
         for node in block.behaviours

@@ -8,7 +8,8 @@ from typing import NoReturn
 import click
 
 import realizer
-from realizer.cli import options
+from realizer.cli import progress
+from realizer.cli.options import option
 from realizer.core.errors import RealizerError, TableError, UnknownNameError
 from realizer.core.threads import use_one_thread
 
@@ -19,13 +20,13 @@ COMMANDS = """
     replay schedule serve study timeline track voices
 """
 # Commands that are not in the module of their name.
-MODULES = {"outputs": "doctor", "schedule": "realize", "voices": "doctor"}
+MODULES = {"outputs": "doctor", "plugins": "doctor", "schedule": "realize", "voices": "doctor"}
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(realizer.__version__, prog_name="realizer")
-@click.option("-v", "--verbose", is_flag=True, help=options.VERBOSE)
-@click.option("-q", "--quiet", is_flag=True, help=options.QUIET)
+@option("-v --verbose", progress.VERBOSE, is_flag=True)
+@option("-q --quiet", progress.QUIET, is_flag=True)
 @click.pass_context
 def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     """Turn BML, the Behavior Markup Language, into an animated, speaking face.
@@ -51,12 +52,12 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
       3  something is missing on this machine; the message says what
     """
     use_one_thread()
-    options.configure_logging(context, quiet=quiet, verbose=verbose)
+    progress.configure_logging(context, quiet=quiet, verbose=verbose)
 
 
 for name in COMMANDS.split():
     command: click.Command = getattr(import_module(f"realizer.cli.{MODULES.get(name, name)}"), name)
-    options.verbosity(command)
+    progress.verbosity(command)
     cli.add_command(command)
 
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import waiting
 from realizer.core.errors import RealizerError
 
 if TYPE_CHECKING:
@@ -18,11 +20,9 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("audio", type=options.FILE)
 @click.argument("text")
-@click.option(
-    "--language", default="en-US", metavar="TAG", help="Language, as a BCP-47 tag.  [default: en-US]"
-)
-@click.option("--aligner", type=click.Choice(["pocketsphinx", "espeak"]), help="Use only this aligner.")
-@click.option("-o", "--output", metavar="FILE", type=options.OUTPUT, help="Write a .json or .vtt file.")
+@option("--language TAG", "Language, as a BCP-47 tag.  [default: en-US]", default="en-US", show_default=False)
+@option("--aligner", "Use only this aligner.", click.Choice(["pocketsphinx", "espeak"]))
+@option("-o --output FILE", "Write a .json or .vtt file.", options.OUTPUT)
 def align(audio: Path, text: str, language: str, aligner: str | None, output: Path | None) -> None:
     """Find when each word of a recording is spoken.
 
@@ -36,15 +36,13 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
     from realizer.behaviours.sound_file import read_sound
     from realizer.speech.align.aligner import align as find_words
 
-    options.check_suffix(output, ".json", ".vtt")
+    inputs.check_suffix(output, ".json", ".vtt")
     if text.startswith("@"):
-        content = options.read_file(text[1:])
-        text = options.decode(content, text[1:], "a text")
-    try:
+        content = inputs.read_file(text[1:])
+        text = inputs.decode(content, text[1:], "a text")
+    with inputs.reporting(RealizerError, f"{audio}: ", click.ClickException):
         recording = read_sound(audio.read_bytes())
-    except RealizerError as error:
-        raise click.ClickException(f"{audio}: {error}") from None
-    with options.waiting("aligning"):
+    with waiting("aligning"):
         alignment = find_words(recording.pcm, recording.rate, text, language, aligner=aligner)  # type: ignore[arg-type]
     for warning in alignment.warnings:
         click.echo(f"realizer: {warning}", err=True)
@@ -53,7 +51,7 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
         for word, confidence in zip(alignment.words, alignment.confidences, strict=True):
             click.echo(f"{word.start:8.3f} {word.end:8.3f}  {confidence:.2f}  {word.text}")
     else:
-        with options.writing(output):
+        with inputs.opening(output):
             output.write_text((_json if output.suffix.lower() == ".json" else _vtt)(alignment), "utf-8")
 
 

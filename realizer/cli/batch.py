@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import bar, note, warn_no_voice
 from realizer.cli.realize import PICTURES, performance_options
 
 if TYPE_CHECKING:
@@ -34,35 +35,26 @@ def _formats(context: click.Context, parameter: click.Parameter, value: tuple[st
     return tuple(suffixes)
 
 
-def _suffixes() -> Iterable[str]:
-    from realizer.outputs.registry import OUTPUTS
-
-    return (suffix.removeprefix(".") for suffix in OUTPUTS)
-
-
 @click.command()
 @click.argument("places", nargs=-1, required=True, metavar="IN...")
-@click.option(
-    "-o",
-    "--output",
-    "folder",
+@option(
+    "-o --output DIR",
+    "Folder for the outputs and manifest.jsonl.",
+    click.Path(file_okay=False, path_type=Path),
+    name="folder",
     required=True,
-    metavar="DIR",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the outputs and manifest.jsonl.",
 )
-@click.option(
-    "--format",
-    "formats",
+@option(
+    "--format NAME",
+    "Format to write, a suffix of `realizer outputs`; repeat it for several.",
+    name="formats",
     multiple=True,
     required=True,
-    metavar="NAME",
     callback=_formats,
-    shell_complete=options.completing(_suffixes),
-    help="Format to write, a suffix of `realizer outputs`; repeat it for several.",
+    shell_complete=options.completing("realizer.outputs.registry:OUTPUTS"),
 )
-@click.option("--workers", type=click.IntRange(1, 1024), help="Number of processes.  [default: one per core]")
-@click.option("--dask", metavar="ADDRESS", help="Run on the workers of this Dask scheduler instead.")
+@option("--workers", "Number of processes.  [default: one per core]", click.IntRange(1, 1024))
+@option("--dask ADDRESS", "Run on the workers of this Dask scheduler instead.")
 @performance_options
 def batch(
     places: tuple[str, ...],
@@ -92,20 +84,18 @@ def batch(
     from realizer.batch.documents import DocumentsError, find
     from realizer.batch.run import batch as run
 
-    with options.reporting(DocumentsError):
+    with inputs.reporting(DocumentsError):
         lines = (list(filter(str.strip, sys.stdin.read().splitlines())) if p == "-" else [p] for p in places)
         documents = find(place for listed in lines for place in listed)
     counts: Counter[str] = Counter()
     dropped = 0
     pool = _workers(how, min(workers or _core_count(), len(documents)), dask)
     try:
-        with click.progressbar(
+        with bar(
             run(documents, folder, how, pool),
-            length=len(documents),
+            len(documents),
             show_pos=True,
-            file=sys.stderr,
             item_show_func=lambda item: None if item is None else item[0]["document"],
-            hidden=options.is_quiet(),
         ) as rows:
             for row, known in rows:
                 counts[row["status"]] += 1
@@ -117,7 +107,7 @@ def batch(
         pool.close()
     parts = ", ".join(f"{counts[status]} {status}" for status in STATUS if counts[status])
     before = f" ({counts['known']} of them before)" if counts["known"] else ""
-    options.note(f"{folder}: {parts}{before}; see manifest.jsonl for details")
+    note(f"{folder}: {parts}{before}; see manifest.jsonl for details")
     return 1 if counts["refused"] or counts["failed"] or (strict and dropped) else 0
 
 
@@ -126,13 +116,13 @@ def _options(formats: tuple[str, ...], flags: dict[str, Any]) -> Options:
     from realizer.batch.task import Options
     from realizer.speech.registry import find_voice
 
-    chosen = options.play_settings(flags, light=flags["light"], background=flags["background"])
+    chosen = inputs.play_settings(flags, light=flags["light"], background=flags["background"])
     if any(suffix in PICTURES for suffix in formats):
         options.check_camera(chosen.face, flags["camera"])
-    play = chosen.play_options(options.read_scene(chosen.scene))
+    play = chosen.play_options(inputs.read_scene(chosen.scene))
     voice = find_voice(chosen.voice)
     voice.close()
-    options.warn_no_voice(chosen.voice)
+    warn_no_voice(chosen.voice)
     return Options(
         **vars(play),
         formats=formats,

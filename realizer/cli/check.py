@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
 from realizer.cli.enrich import language, mood, role, warn_unknown_languages, words, words_for
+from realizer.cli.options import option
+from realizer.cli.progress import is_quiet, note
 from realizer.cli.timeline import SUFFIXES, advice_on, faults_in
 
 if TYPE_CHECKING:
@@ -33,30 +35,25 @@ IMPOSSIBLE = "IMPOSSIBLE_LENGTH"  # type of faults by --limit
 @mood
 @language
 @words
-@click.option(
+@option(
     "--long/--short",
+    "Show the source with marks and help, or one line per fault.  [default: --long on a terminal]",
     default=None,
-    help="Show the source with marks and help, or one line per fault.  [default: --long on a terminal]",
 )
-@click.option(
+@option(
     "--limit",
+    "Count expressions that are shorter or longer than was ever observed as faults, not as advice.",
     is_flag=True,
-    help="Count expressions that are shorter or longer than was ever observed as faults, not as advice.",
 )
 @click.pass_context
 def check(
     context: click.Context,
+    /,
     documents: tuple[str, ...],
-    scene: Path | None,
-    media: Path | None,
-    expressions: Path | None,
-    strict_bml: bool | None,
-    role: Role,
-    mood: Mood | None,
-    language: str | None,
     words: Path | None,
     long: bool | None,
     limit: bool,
+    **flags: Any,
 ) -> int:
     """Explain every fault of documents, with line, column and path.
 
@@ -88,16 +85,16 @@ def check(
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # the terminal's encoding may lack characters of a document
             stream.reconfigure(errors="backslashreplace")
-    chosen = options.settings(language=language, media=media, expressions=expressions, strict_bml=strict_bml)
-    lists = words_for(language, words)
+    scene, who = flags.pop("scene"), (flags.pop("role"), flags.pop("mood"))
+    chosen, lists = inputs.settings(**flags), words_for(flags["language"], words)
     faults = 0
     warned: set[str] = set()
-    for name, text in zip(documents, options.read_documents(documents), strict=True):
+    for name, text in zip(documents, inputs.read_documents(documents), strict=True):
         if Path(name).suffix.lower() in SUFFIXES and isinstance(text, bytes):
-            faults += _check_timeline(name, text, chosen.expressions, (role, mood), limit)
+            faults += _check_timeline(name, text, chosen.expressions, who, limit)
             continue
         # Each file has a player of its own, so that reports are independent.
-        player = options.planning_player(chosen, scene)
+        player = inputs.planning_player(chosen, scene)
         source = Source(text)
         blocks = found = 0
         for part in check_document(name, source, text, player):
@@ -105,13 +102,9 @@ def check(
             found += len(part.findings)
             for finding in part.findings:
                 show(finding, source)
-            if part.block is not None and part.schedule is not None and (limit or not options.is_quiet()):
+            if part.block is not None and part.schedule is not None and (limit or not is_quiet()):
                 slips = advice(name, source, part.block, part.schedule, player)
-                unusual = list(
-                    advise_on_behaviours(
-                        name, source, part.block, part.schedule, part.utterances, role, mood, lists
-                    )
-                )
+                unusual = list(advise_on_behaviours(name, source, part, *who, lists))
                 if context.obj["verbose"]:
                     warn_unknown_languages(lists, languages_in(part.block, lists), warned)
                 impossible = [finding for finding in unusual if limit and finding.is_impossible]
@@ -119,10 +112,10 @@ def check(
                 for finding in impossible:
                     show(replace(finding, type=IMPOSSIBLE), source)
                 hints = chain(slips, (finding for finding in unusual if finding not in impossible))
-                for finding in () if options.is_quiet() else islice(hints, MAX_ADVICE):
+                for finding in () if is_quiet() else islice(hints, MAX_ADVICE):
                     show(finding, source, err=True)
         if not found:
-            options.note(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}")
+            note(f"{name}: no fault in {blocks} block{'s' * (blocks != 1)}")
         faults += found
     return 1 if faults else 0
 
@@ -139,10 +132,10 @@ def _check_timeline(
         faults = [f"{IMPOSSIBLE} {fault}" for fault in advice_on(text, library, *who, impossible=True)]
     for fault in faults:
         click.echo(f"{name}: {fault}")
-    if not faults and not options.is_quiet():
+    if not faults and not is_quiet():
         for advice in advice_on(text, library, *who):
-            options.note(f"{name}: ADVICE {advice}")
-        options.note(f"{name}: no fault in this timeline")
+            note(f"{name}: ADVICE {advice}")
+        note(f"{name}: no fault in this timeline")
     return len(faults)
 
 

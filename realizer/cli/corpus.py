@@ -6,9 +6,11 @@ from typing import Any, TypeAlias
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
 from realizer.cli.marker_options import follow as follow_markers
 from realizer.cli.marker_options import look_of, marker_options
+from realizer.cli.options import option
+from realizer.cli.progress import note
 from realizer.cli.track import follow as follow_faces
 
 folder = click.argument("folder", metavar="DIR", type=options.FOLDER)
@@ -42,24 +44,20 @@ def init(folder: Path) -> None:
         raise click.UsageError(f"{folder}: wanted a new folder, got a corpus")
     folder.mkdir(parents=True, exist_ok=True)
     (folder / CORPUS).write_text("version = 1\n", "utf-8")
-    options.note(
-        f"{folder}: a corpus without recordings; add some by `realizer corpus add {folder} NAME FILE`"
-    )
+    note(f"{folder}: a corpus without recordings; add some by `realizer corpus add {folder} NAME FILE`")
 
 
 @corpus.command()
 @folder
 @click.argument("name")
 @click.argument("files", nargs=-1, type=options.FILE)
-@click.option("--person", help="Who is recorded; the speaker of that name, or `subject`, is this person.")
-@click.option("--mood", help="Mood of the person; several by commas.")
-@click.option("--fragment", help="Name of the fragment or scene in tables.  [default: NAME]")
-@click.option("--language", metavar="TAG", help="Language of the words, as a BCP-47 tag.  [default: en]")
-@click.option("--licence", help="Licence of the recording.")
-@click.option(
-    "--fps", type=options.Number(1, 1000), help="Frames per second.  [default: of the files, or 25]"
-)
-@click.option("--frames", type=click.IntRange(1, 1_000_000), help="Frames, if more than files tell.")
+@option("--person", "Who is recorded; the speaker of that name, or `subject`, is this person.")
+@option("--mood", "Mood of the person; several by commas.")
+@option("--fragment", "Name of the fragment or scene in tables.  [default: NAME]")
+@option("--language TAG", "Language of the words, as a BCP-47 tag.  [default: en]")
+@option("--licence", "Licence of the recording.")
+@option("--fps", "Frames per second.  [default: of the files, or 25]", options.Number(1, 1000))
+@option("--frames", "Frames, if more than files tell.", click.IntRange(1, 1_000_000))
 def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     """Add a recording NAME, or more FILES of it: a film, FAPs, points, labels and words.
 
@@ -91,14 +89,14 @@ def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     known = {key: fact for key, fact in facts.items() if fact is not None}
     found = replace(found, meta={**found.meta, **known})
     recordings.write_recording(path, found)
-    options.note(f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words")
+    note(f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words")
 
 
 @corpus.command()
 @folder
 @click.argument("names", nargs=-1)
 @marker_options
-@click.option("--neutral", type=click.IntRange(0), help="Number of the picture that shows markers at rest.")
+@option("--neutral", "Number of the picture that shows markers at rest.", click.IntRange(0))
 @options.face("Face whose feature points markers are laid on", default="default", show_default=True)
 def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, **chosen: Any) -> int:
     """Track the films of a corpus, or of recordings NAMES, that have no points or FAPs yet.
@@ -127,24 +125,24 @@ def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, 
                 times, people = follow_faces(film, None)
                 known = films.with_face(known, people[0], times)
                 if len(people) > 1:
-                    options.note(f"{film}: {len(people)} people; took the one who is seen most")
+                    note(f"{film}: {len(people)} people; took the one who is seen most")
             write_recording(target, known)
         except (TrackingError, CorpusError) as error:
             click.echo(f"realizer: {error}", err=True)
             failed += 1
             continue
         done += 1
-        options.note(f"{target}: {known.frames} frames")
-    options.note(f"{folder}: {done} of {len(found)} films tracked, {failed} failed")
+        note(f"{target}: {known.frames} frames")
+    note(f"{folder}: {done} of {len(found)} films tracked, {failed} failed")
     return 1 if failed else 0
 
 
 @corpus.command()
 @folder
 @click.argument("name")
-@click.option("--annotator", default="me", show_default=True, help="Whose labels to add or remove.")
-@click.option("--add", "added", type=SEGMENT, multiple=True, metavar="START END EXPRESSION", help="Seconds.")
-@click.option("--remove", "removed", type=SEGMENT, multiple=True, metavar="START END EXPRESSION")
+@option("--annotator", "Whose labels to add or remove.", default="me")
+@option("--add START END EXPRESSION", "Seconds.", SEGMENT, name="added", multiple=True)
+@option("--remove START END EXPRESSION", type=SEGMENT, name="removed", multiple=True)
 def label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans) -> None:
     """Add or remove segments of a recording NAME, and print them with the agreement of annotators.
 
@@ -153,7 +151,7 @@ def label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans)
     from realizer.corpus.agreement import agreement
     from realizer.corpus.recording import CorpusError, change, read_recording, write_recording
 
-    with options.reporting(CorpusError):
+    with inputs.reporting(CorpusError):
         found = read_recording(folder / name)
         if added or removed:
             found = change(found, annotator, added, removed)
@@ -176,7 +174,7 @@ def _check_corpus(folder: Path) -> None:
 @corpus.command()
 @folder
 @click.argument("name")
-@click.option("-o", "--output", required=True, metavar="FILE", type=options.OUTPUT, help=".eaf or .TextGrid")
+@option("-o --output FILE", ".eaf or .TextGrid", options.OUTPUT, required=True)
 def export(folder: Path, name: str, output: Path) -> None:
     """Write the labels and words of a recording for ELAN or Praat."""
     from realizer.corpus.formats import write_annotations
@@ -187,7 +185,7 @@ def export(folder: Path, name: str, output: Path) -> None:
 
 @corpus.command()
 @folder
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the map.")
+@option("--seed", "Seed of the map.", click.IntRange(0), default=0)
 def learn(folder: Path, seed: int) -> None:
     """Learn a map of the faces: main components, and 10 x 10 typical faces (a self-organising map).
 
@@ -200,7 +198,7 @@ def learn(folder: Path, seed: int) -> None:
     learnt = learning.learn([one for one in read_corpus(folder) if one.has_frames], seed)
     learning.save(folder, learnt)
     named = sum(map(bool, learnt.names))
-    options.note(f"{folder}: {len(learnt.components)} components, {named} of {len(learnt.names)} cells named")
+    note(f"{folder}: {len(learnt.components)} components, {named} of {len(learnt.names)} cells named")
 
 
 @corpus.command()
@@ -224,11 +222,9 @@ def find(folder: Path) -> None:
 
 @corpus.command()
 @folder
-@click.option("--annotator", help="Whose labels to describe.  [default: the first of each recording]")
-@click.option(
-    "-o", "--output", metavar="DIR", type=options.OUTPUT, help="Folder to write.  [default: DIR/report]"
-)
-@click.option("--word", "watched", multiple=True, help="A word with a row in table 6.11 even if it is rare.")
+@option("--annotator", "Whose labels to describe.  [default: the first of each recording]")
+@option("-o --output DIR", "Folder to write.  [default: DIR/report]", options.OUTPUT)
+@option("--word", "A word with a row in table 6.11 even if it is rare.", name="watched", multiple=True)
 def describe(folder: Path, annotator: str | None, output: Path | None, watched: tuple[str, ...]) -> None:
     """Write statistics as tables and report.html, and the rules, durations, profiles and expressions.
 
@@ -246,4 +242,4 @@ def describe(folder: Path, annotator: str | None, output: Path | None, watched: 
     study = Study(recordings, annotator, word_list(language), frozenset(map(str.lower, watched)))
     if not study.every:
         raise click.UsageError(f"{folder}: wanted labels, got none; add some, or see `realizer corpus find`")
-    options.note(f"{target}: {', '.join(write_report(target, study, folder))}")
+    note(f"{target}: {', '.join(write_report(target, study, folder))}")

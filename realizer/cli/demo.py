@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import click
 
 from realizer.cli import options
+from realizer.cli.options import option
+from realizer.cli.progress import steps, warn_no_voice
 
 if TYPE_CHECKING:
     from bml_schema import Feedback
@@ -23,10 +25,8 @@ NEXT = """now try:
 
 
 @click.command()
-@click.option("--once", is_flag=True, help="Exit after playing the examples.")
-@click.option(
-    "--port", default=8765, show_default=True, help="Port of the page; if it is in use, a free one is chosen."
-)
+@option("--once", "Exit after playing the examples.", is_flag=True)
+@option("--port", "Port of the page; if it is in use, a free one is chosen.", default=8765)
 @options.voice
 @options.face("Face to show", default="default", show_default=True)
 def demo(once: bool, port: int, voice: str | None, face: str) -> None:
@@ -53,11 +53,11 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
 
     appended = [text.replace("<bml ", '<bml composition="APPEND" ', 1) for text in documents]
     realization = realize(appended, face=face, voice=voice)
-    options.warn_no_voice(voice)
+    warn_no_voice(voice)
     for path in (FRAMES, FILM):
         click.echo(f"writing {path} ({realization.duration:.1f} s) ...")
         try:
-            with options.steps("drawing") as drawn:
+            with steps("drawing") as drawn:
                 output_for(path).write(realization, path, RenderSettings(drawn=drawn))
         except RealizerError as error:
             click.echo(f"realizer: {path} was left out: {error}", err=True)

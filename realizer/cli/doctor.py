@@ -1,9 +1,10 @@
-"""`doctor`, `voices` and `outputs`: list what works on this machine, and how to install the rest."""
+"""`doctor`, `voices`, `outputs` and `plugins`: list what works on this machine, and how to get the rest."""
 
 import json
 import platform
 import shutil
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -12,6 +13,7 @@ import click
 
 import realizer
 from realizer.cli import options
+from realizer.cli.progress import note
 
 Finding = tuple[bool, str, str]  # whether it works, its name, a description or the fix
 PACKAGES = ("numpy", "scipy", "numba", "moderngl", "av", "espeakng-loader", "hibari-tts", "pocketsphinx")
@@ -120,6 +122,30 @@ def outputs() -> None:
         fixes = "; ".join(filter(None, map(_fix, output.needs)))
         missing = f"  (missing: {fixes})" if fixes else ""
         click.echo(f"{suffix:<{width}}  {output.media_type:<{type_width}}  {output.description}{missing}")
+
+
+@click.command()
+@options.as_json
+def plugins(as_json: bool) -> None:
+    """List the behaviours, outputs, voices, transports and faces of other packages.
+
+    Prints group, name, package and object of each, and why it cannot be used if so.
+    """
+    from realizer.behaviours.registry import FAMILIES
+    from realizer.face.load import FACES
+    from realizer.outputs.registry import OUTPUTS
+    from realizer.server.transports.transport import TRANSPORTS
+    from realizer.speech.registry import VOICES
+
+    found = [p for registry in (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES) for p in registry.plugins()]
+    if as_json:
+        click.echo(json.dumps([asdict(plugin) for plugin in found], indent=1))
+        return
+    for plugin in found:
+        fault = f"  (not used: {plugin.fault})" if plugin.fault else ""
+        click.echo(f"{plugin.group:<20} {plugin.name:<12} {plugin.package:<16} {plugin.value}{fault}")
+    if not found:
+        note("no plug-ins are installed; docs/adding.md says how to write one")
 
 
 @cache

@@ -7,22 +7,23 @@ from typing import TYPE_CHECKING
 
 import click
 
+from realizer.cli.options import option
+
 if TYPE_CHECKING:
     from realizer.core.settings import Settings
 
 
 @click.command("edit")
 @click.argument("name")
-@click.option(
+@option(
     "--edit",
-    "folder",
-    type=click.Path(file_okay=False, path_type=Path),
+    "Folder to save in; the copy of the face is in its folder faces.",
+    click.Path(file_okay=False, path_type=Path),
     default=Path("edited"),
-    show_default=True,
-    help="Folder to save in; the copy of the face is in its folder faces.",
+    name="folder",
 )
-@click.option("--port", default=0, help="Port of the page.  [default: a free one]")
-@click.option("--browser/--no-browser", default=True, help="Open the page in the browser.")
+@option("--port", "Port of the page.  [default: a free one]", default=0, show_default=False)
+@option("--browser/--no-browser", "Open the page in the browser.", default=True, show_default=False)
 def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
     """Edit the feature points and zones of a face in the browser, on a copy of it.
 

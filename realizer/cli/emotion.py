@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import note
 
 if TYPE_CHECKING:
     from realizer.emotions.profile import Profile
@@ -17,66 +19,33 @@ if TYPE_CHECKING:
 RINGS = (1.0, 3.0, 5.0, 7.0)  # activations in the picture of the wheel, as in Paul 2010, 6.4
 
 
-def _known_words() -> Iterable[str]:
-    from realizer.emotions.words import known_words
-
-    return known_words()
-
-
 @click.command()
 @click.argument(
-    "word", metavar="[WORD|FILE.txt]", required=False, shell_complete=options.completing(_known_words)
+    "word",
+    metavar="[WORD|FILE.txt]",
+    required=False,
+    shell_complete=options.completing("realizer.emotions.words:known_words"),
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: the ranges and all 68 values.")
-@click.option(
+@option("--json", "Print JSON: the ranges and all 68 values.", name="as_json", is_flag=True)
+@option(
     "--profiles",
-    type=options.ProfileSet(),
-    default="own",
-    show_default=True,
-    help="Profiles: own, those of Raouzaiou et al. 2002, corrected (published) or as printed (raw), or of a "
+    "Profiles: own, those of Raouzaiou et al. 2002, corrected (published) or as printed (raw), or of a "
     'file. "published, fear 3" has fear 3 stand for fear.',
+    options.ProfileSet(),
+    default="own",
 )
-@click.option("--angle", type=float, metavar="DEGREES", help="Angle on the wheel of Paul 2010.")
-@click.option("--activation", type=float, help="With --angle: 0 (neutral) to 7 (full).  [default: full]")
-@click.option("--valence", type=float, help="Unpleasant (-1) to pleasant (1); needs --arousal.")
-@click.option("--arousal", type=float, help="Calm (-1) to excited (1); needs --valence.")
-@click.option("--seed", type=click.IntRange(0), help="Choose random values instead of the middle values.")
-@click.option(
-    "-o",
-    "--output",
-    type=options.OUTPUT,
-    metavar="FILE",
-    help="Write a picture (.png) or a profile file of Paul 2010, 6.3 (.txt).",
+@option("--angle DEGREES", "Angle on the wheel of Paul 2010.", float)
+@option("--activation", "With --angle: 0 (neutral) to 7 (full).  [default: full]", float)
+@option("--valence", "Unpleasant (-1) to pleasant (1); needs --arousal.", float)
+@option("--arousal", "Calm (-1) to excited (1); needs --valence.", float)
+@option("--seed", "Choose random values instead of the middle values.", click.IntRange(0))
+@option(
+    "-o --output FILE", "Write a picture (.png) or a profile file of Paul 2010, 6.3 (.txt).", options.OUTPUT
 )
-@click.option(
-    "--wheel",
-    "chart",
-    type=options.OUTPUT,
-    metavar="FILE.png",
-    help="Draw the whole wheel: 16 angles at 4 activations.",
-)
+@option("--wheel FILE.png", "Draw the whole wheel: 16 angles at 4 activations.", options.OUTPUT, name="chart")
 @options.face("Face to draw", default="default", show_default=True)
-@click.option(
-    "--camera",
-    default="close",
-    show_default=True,
-    shell_complete=options.completing(options.cameras),
-    help=options.CAMERAS,
-)
-def emotion(
-    word: str | None,
-    as_json: bool,
-    profiles: str,
-    angle: float | None,
-    activation: float | None,
-    valence: float | None,
-    arousal: float | None,
-    seed: int | None,
-    output: Path | None,
-    chart: Path | None,
-    face: str,
-    camera: str,
-) -> None:
+@option("--camera", options.CAMERAS, default="close", shell_complete=options.completing_cameras)
+def emotion(output: Path | None, chart: Path | None, face: str, camera: str, **how: Any) -> None:
     """Print which FAPs an emotion moves, and how far.
 
     The emotion is a WORD, a place on the emotion wheel (--angle), a degree of valence and arousal, or each
@@ -88,11 +57,12 @@ def emotion(
     realizer emotion --valence -0.6 --arousal 0.4 --json
     realizer emotion --wheel wheel.png
     """
-    options.check_suffix(output, ".png", ".txt")
-    options.check_suffix(chart, ".png")
+    inputs.check_suffix(output, ".png", ".txt")
+    inputs.check_suffix(chart, ".png")
     if output or chart:
         options.check_camera(face, camera)
-    found, shares = _requested_profiles(word, profiles, angle, activation, valence, arousal, bool(chart))
+    found, shares = _requested_profiles(how, bool(chart))
+    seed, as_json = how["seed"], how["as_json"]
     if found:
         if output is not None:  # before anything is printed: the reader may close the pipe
             _write(found, seed, output, face, camera)
@@ -101,31 +71,24 @@ def emotion(
     elif output is not None or as_json or seed is not None:
         raise click.UsageError("wanted a WORD or a place for --json, --seed and -o; got only --wheel")
     if chart is not None:
-        _draw_wheel(profiles, chart, face, camera)
+        _draw_wheel(how["profiles"], chart, face, camera)
 
 
 def _requested_profiles(
-    word: str | None,
-    profiles: str,
-    angle: float | None,
-    activation: float | None,
-    valence: float | None,
-    arousal: float | None,
-    wheel_only: bool,
+    how: dict[str, Any], wheel_only: bool
 ) -> tuple[tuple[Profile, ...], Mapping[str, float]]:
-    """Return the profiles of the options; none if only the wheel was requested.
-
-    Also return archetype -> share at a place on the wheel.
-    """
+    """Return the profiles of the options, none if only the wheel was requested; and archetype -> share."""
     from realizer.emotions.archetypes import is_profile_file, read_profile_file
     from realizer.emotions.chosen import emotion_and_shares
 
-    if wheel_only and all(option is None for option in (word, angle, activation, valence, arousal)):
+    word, *place = (how[name] for name in ("word", "angle", "activation", "valence", "arousal"))
+    angle, activation, valence, arousal = place
+    if wheel_only and all(option is None for option in (word, *place)):
         return (), {}
-    with options.reporting(ValueError):
+    with inputs.reporting(ValueError):
         if word is not None and is_profile_file(word) and angle is None and valence is None:
             return read_profile_file(Path(word)), {}
-        profile, shares = emotion_and_shares(word, angle, activation, (valence, arousal), profiles)
+        profile, shares = emotion_and_shares(word, angle, activation, (valence, arousal), how["profiles"])
         return (profile,), shares
 
 
@@ -190,4 +153,4 @@ def _draw_wheel(profiles: str, path: Path, face: str, camera: str) -> None:
     notes = [(f"activation {activation:g}",) for _, activation in places]
     columns = len(places) // len(RINGS)
     Image.fromarray(sheet(list(pictures), titles, notes, columns)).save(path)
-    options.note(f"{path}: {len(places)} faces")
+    note(f"{path}: {len(places)} faces")

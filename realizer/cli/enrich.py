@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import is_quiet, note
 
 if TYPE_CHECKING:
     from realizer.knowledge.word_languages import Words
@@ -32,51 +34,36 @@ class MoodWord(click.ParamType):  # type: ignore[type-arg]
             self.fail(error.args[0].removeprefix("mood: "), parameter, context)
 
 
-def _moods() -> Iterable[str]:
-    from realizer.tables.knowledge import knowledge
-
-    return knowledge().moods
-
-
-role = click.option(
+role = option(
     "--role",
-    type=click.Choice(["speaker", "listener"]),
+    "Whether the face speaks the text or listens to it.",
+    click.Choice(["speaker", "listener"]),
     default="speaker",
-    show_default=True,
-    help="Whether the face speaks the text or listens to it.",
 )
-mood = click.option(
-    "--mood",
-    type=MoodWord(),
-    metavar="WORD",
-    shell_complete=options.completing(_moods),
-    help="Mood, such as happy or sad: how often expressions come and how long they last.",
+mood = option(
+    "--mood WORD",
+    "Mood, such as happy or sad: how often expressions come and how long they last.",
+    MoodWord(),
+    shell_complete=options.completing("realizer.tables.knowledge:knowledge", "moods"),
 )
-language = click.option(
-    "--language", metavar="TAG", help="Language of text without xml:lang, as a BCP-47 tag.  [default: en-US]"
-)
-words = click.option(
-    "--words",
-    type=options.FILE,
-    metavar="FILE.csv",
-    help="Your own emotional words, for texts in --language, or for all texts without it; the format is that "
+language = option("--language TAG", "Language of text without xml:lang, as a BCP-47 tag.  [default: en-US]")
+words = option(
+    "--words FILE.csv",
+    "Your own emotional words, for texts in --language, or for all texts without it; the format is that "
     "of realizer/tables/emotional_words_en.csv.",
+    options.FILE,
 )
 
 
 def words_for(language: str | None, file: Path | None) -> Words:
-    """Return the emotional words to use.
-
-    Raises:
-        click.UsageError: the file is not a list of words.
-    """
+    """Return the emotional words to use."""
     from realizer.core.errors import TableError
     from realizer.knowledge.word_languages import Words
     from realizer.tables.emotional_words import words_of
 
-    with options.reporting(TableError):
+    with inputs.reporting(TableError):
         own = words_of(file) if file is not None else None
-    return Words(options.settings(language=language).language, own, everywhere=language is None)
+    return Words(inputs.settings(language=language).language, own, everywhere=language is None)
 
 
 def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[str]) -> None:
@@ -91,17 +78,13 @@ def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[s
 
 
 def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | None]:
-    """Return the rules and templates in a folder of `realizer corpus describe`, or ours and None.
-
-    Raises:
-        click.UsageError: a file that cannot be used.
-    """
+    """Return the rules and templates in a folder of `realizer corpus describe`, or ours and None."""
     from realizer.core.errors import TableError
     from realizer.tables import knowledge, templates
 
     if folder is None:
         return knowledge.knowledge(), None
-    with options.reporting(TableError):
+    with inputs.reporting(TableError):
         durations = folder / templates.FILE
         return (
             knowledge.read_knowledge(folder / knowledge.FILE),
@@ -115,26 +98,15 @@ def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | 
 @mood
 @language
 @words
-@click.option(
-    "--knowledge",
-    metavar="DIR",
-    type=options.FOLDER,
-    is_eager=True,
-    help="Folder with the rules (knowledge.toml) and durations (templates.toml) to use, as written by "
+@option(
+    "--knowledge DIR",
+    "Folder with the rules (knowledge.toml) and durations (templates.toml) to use, as written by "
     "`realizer corpus describe`.",
+    options.FOLDER,
+    is_eager=True,
 )
-@click.option(
-    "-o", "--output", metavar="OUT.bml", type=options.OUTPUT, help="File to write.  [default: print it]"
-)
-def enrich(
-    text: str,
-    role: Any,
-    mood: Any,
-    language: str | None,
-    words: Path | None,
-    knowledge: Path | None,
-    output: Path | None,
-) -> int:
+@option("-o --output OUT.bml", "File to write.  [default: print it]", options.OUTPUT)
+def enrich(text: str, language: str | None, words: Path | None, output: Path | None, **who: Any) -> int:
     """Add facial expressions to a text or a BML document (Wojdel 2005, 6.5).
 
     A text becomes a BML document that speaks it, with expressions at words and sentence ends; in a document,
@@ -150,23 +122,23 @@ def enrich(
 
     source = _read(text)
     lists = words_for(language, words)
-    with options.reporting(ValueError):
-        enricher = Enricher(role, mood, lists, *rules_for(knowledge))
+    with inputs.reporting(ValueError):
+        enricher = Enricher(who["role"], who["mood"], lists, *rules_for(who["knowledge"]))
         enriched = Enrichment.of(source, enricher, partial(click.echo, err=True))
-    if not options.is_quiet():
+    if not is_quiet():
         warn_unknown_languages(lists, enriched.languages, set())
     if language is None and words is None and _is_foreign(source, lists.language):
-        options.note(
+        note(
             f"this text has no letters of {lists.language!r}, so only punctuation counts; see --language and "
             "--words"
         )
     if output is None:
         sys.stdout.write(enriched.bml)
     else:
-        with options.writing(output):
+        with inputs.opening(output):
             output.write_text(enriched.bml, "utf-8")
         placed = enriched.placed
-        options.note(f"{output}: {placed} expression{'s' * (placed != 1)} placed")
+        note(f"{output}: {placed} expression{'s' * (placed != 1)} placed")
     return 1 if enriched.faults else 0
 
 
@@ -179,11 +151,7 @@ def _is_foreign(text: str | bytes, language: str) -> bool:
 
 
 def _read(text: str) -> str | bytes:
-    """Return the text, or the content of the file or standard input; XML, which names its encoding, as bytes.
-
-    Raises:
-        click.UsageError: a missing file, or a text that is not UTF-8.
-    """
+    """Return the text, or the content of the file or standard input; XML names its encoding: bytes."""
     from realizer.enrichment import MARKED, is_file_name
 
     try:
@@ -195,7 +163,5 @@ def _read(text: str) -> str | bytes:
         if is_folder or is_file_name(text):
             raise click.UsageError(f"{text}: wanted a text or an existing file; - reads standard input")
         return text
-    data = options.read_file(text)
-    if MARKED.match(data):
-        return data
-    return options.decode(data, text, "a text")
+    data = inputs.read_file(text)
+    return data if MARKED.match(data) else inputs.decode(data, text, "a text")

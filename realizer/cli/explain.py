@@ -6,20 +6,20 @@ from typing import Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import print_warnings
 
 
 @click.command()
 @options.documents
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    type=options.OUTPUT,
-    help="Write a page (.html), or a drawing of the steps (.svg, .png).  [default: print text]",
+@option(
+    "-o --output FILE",
+    "Write a page (.html), or a drawing of the steps (.svg, .png).  [default: print text]",
+    options.OUTPUT,
 )
 @options.face("Face that is moved")
-@click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face.")
+@option("--no-idle", "No blinks or small head motion of an idle face.", is_flag=True)
 @options.playback_options
 def explain(
     documents: tuple[str, ...], output: Path | None, no_idle: bool, strict: bool, **flags: Any
@@ -36,23 +36,23 @@ def explain(
     """
     from realizer.charts.write_chart import WRITERS
 
-    options.check_suffix(output, ".html", *WRITERS)
-    chosen = options.settings(**flags)
-    texts = options.read_documents(documents)
+    inputs.check_suffix(output, ".html", *WRITERS)
+    chosen = inputs.settings(**flags)
+    texts = inputs.read_documents(documents)
     from realizer import pipeline
     from realizer.explained import as_html, as_picture, as_text, steps_of
     from realizer.result import Realization
 
-    play = chosen.play_options(options.read_scene(chosen.scene))
+    play = chosen.play_options(inputs.read_scene(chosen.scene))
     played = Realization.of(pipeline.play(texts, replace(play, idle=play.idle and not no_idle), chosen.voice))
-    options.print_warnings(played.warnings)
+    print_warnings(played.warnings)
     if not played.has_content:
         return 1
     steps = steps_of(played)
     if output is None:
         click.echo(as_text(steps), nl=False)
     else:
-        with options.writing(output):
+        with inputs.opening(output):
             write = WRITERS.get(output.suffix.lower())
             page = as_html(steps, played).encode() if write is None else write(as_picture(steps, played))
             output.write_bytes(page)

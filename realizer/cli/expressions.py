@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import note
 
 if TYPE_CHECKING:
     from realizer.expressions.expression import Expression
@@ -18,9 +20,7 @@ if TYPE_CHECKING:
 # Least cosine of the best match; the motion of an idle head reaches 0.3.
 MIN_SIMILARITY = 0.4
 
-sheet_output = click.option(
-    "-o", "--output", metavar="SHEET.png", type=options.OUTPUT, help="Draw the expressions as well."
-)
+sheet_output = option("-o --output SHEET.png", "Draw the expressions as well.", options.OUTPUT)
 
 
 class ActionUnits(click.ParamType):  # type: ignore[type-arg]
@@ -58,8 +58,8 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
     """List the expressions: name, action units, seconds of onset, apex and offset, description."""
     from realizer.expressions.library import library_of
 
-    options.check_suffix(output, ".png")
-    library = list(library_of(options.settings(expressions=expressions).expressions).values())
+    inputs.check_suffix(output, ".png")
+    library = list(library_of(inputs.settings(expressions=expressions).expressions).values())
     _print_matches(library, [""] * len(library), as_json)
     if output is not None:
         _draw(library, [expression.units for expression in library], output, face)
@@ -67,34 +67,21 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 
 @expressions.command()
 @click.argument("text", required=False)
-@click.option("--au", "units", type=ActionUnits(), metavar="1,2,12L=0.5", help="Search by action units.")
-@click.option(
-    "--like",
-    metavar="IMAGE",
-    type=options.FILE,
-    help="Search by a picture of a built-in face, from the front, in one of the lights of --light.",
+@option("--au 1,2,12L=0.5", "Search by action units.", ActionUnits(), name="units")
+@option(
+    "--like IMAGE",
+    "Search by a picture of a built-in face, from the front, in one of the lights of --light.",
+    options.FILE,
 )
-@click.option(
-    "--limit", type=click.IntRange(1), default=8, show_default=True, help="Largest number of results."
-)
+@option("--limit", "Largest number of results.", click.IntRange(1), default=8)
 @options.as_json
 @sheet_output
-@click.option(
-    "--face",
-    metavar="NAME",
-    help="Face to draw; also the face in the picture of --like.  [default: default; any with --like]",
+@option(
+    "--face NAME",
+    "Face to draw; also the face in the picture of --like.  [default: default; any with --like]",
 )
 @options.expressions
-def find(
-    text: str | None,
-    units: Any,
-    like: Path | None,
-    limit: int,
-    as_json: bool,
-    output: Path | None,
-    face: str | None,
-    expressions: Path | None,
-) -> int:
+def find(text: str | None, units: Any, like: Path | None, output: Path | None, **how: Any) -> int:
     """Search expressions by the words of TEXT, by action units or by a picture, best match first.
 
     Exits with 1 if nothing matches.
@@ -109,8 +96,9 @@ def find(
 
     if sum(query is not None for query in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")
-    options.check_suffix(output, ".png")
-    library = list(library_of(options.settings(expressions=expressions).expressions).values())
+    inputs.check_suffix(output, ".png")
+    library = list(library_of(inputs.settings(expressions=how["expressions"]).expressions).values())
+    face: str | None = how["face"]
     if text is not None:
         matches = by_meaning(text, library)
     elif units is not None:
@@ -119,15 +107,15 @@ def find(
         from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
         assert like is not None
-        with options.reporting(UnknownPictureError):
+        with inputs.reporting(UnknownPictureError):
             found = by_picture(read_picture(like), library, None if face is None else [face])
         face, matches = found.face, [match for match in found.matches if match[1] > 0]
         if matches and matches[0][1] < MIN_SIMILARITY:
             matches = []
-        options.note(f"{like}: {face}, {found.light}{', neutral' if found.neutral else ''}")
-    matches = matches[:limit]
+        note(f"{like}: {face}, {found.light}{', neutral' if found.neutral else ''}")
+    matches = matches[: how["limit"]]
     matching, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
-    _print_matches(matching, scores, as_json)
+    _print_matches(matching, scores, how["as_json"])
     if not matches:
         query_text = repr(text) if text is not None else "this query"
         click.echo(f"no expression matches {query_text}; see `realizer expressions list`", err=True)
@@ -156,16 +144,7 @@ def _draw(expressions: Sequence[Expression], notes: Sequence[str], path: Path, f
     """Write a contact sheet of the expressions."""
     from PIL import Image
 
-    from realizer.animation.pose import poses
-    from realizer.cli.sheet_poses import Series, frames, of_expressions
-    from realizer.face.fap_mapping import mapping_of
-    from realizer.face.load import input_names
-    from realizer.render.contact_sheet import sheet
-    from realizer.render.renderer import Renderer
+    from realizer.cli.sheet_poses import draw_expressions
 
-    rows = poses(frames([Series("", of_expressions(expressions))]), input_names(face), mapping_of(face))
-    with Renderer(face, (220, 220), "close") as renderer:
-        pictures = renderer.draw(rows)
-    titles = [expression.name for expression in expressions]
-    Image.fromarray(sheet(list(pictures), titles, [(note,) for note in notes])).save(path)
-    options.note(f"{path}: {len(expressions)} expressions")
+    Image.fromarray(draw_expressions(expressions, notes, face)).save(path)
+    note(f"{path}: {len(expressions)} expressions")

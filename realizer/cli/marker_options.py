@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import options
+from realizer.cli.options import option
+from realizer.cli.progress import bar
 
 if TYPE_CHECKING:
     from realizer.tracking.markers.film import Look, Markers
@@ -27,37 +29,32 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
 
 
 marker_options = options.several(
-    click.option(
-        "--markers",
-        metavar="COLOURS",
-        help="Follow painted markers of these colours: red, yellow, green, cyan, blue, magenta, with "
+    option(
+        "--markers COLOURS",
+        "Follow painted markers of these colours: red, yellow, green, cyan, blue, magenta, with "
         "commas. The second colour is that of painted lids.",
     ),
-    click.option(
-        "--marker-colour",
+    option(
+        "--marker-colour H,S,V",
+        "A colour of markers: degrees and per cent, and if you like the three spreads.",
         multiple=True,
-        metavar="H,S,V",
-        help="A colour of markers: degrees and per cent, and if you like the three spreads.",
     ),
-    click.option(
-        "--marker-at",
-        multiple=True,
-        type=Numbers("X,Y"),
-        metavar="X,Y",
-        help="A pixel in a marker of the first picture (or picture N of --neutral), to learn its colour "
+    option(
+        "--marker-at X,Y",
+        "A pixel in a marker of the first picture (or picture N of --neutral), to learn its colour "
         "from; several are better.",
+        Numbers("X,Y"),
+        multiple=True,
     ),
-    click.option(
-        "--layout",
-        type=options.FILE,
-        metavar="FILE.csv",
-        help="Names and places of the markers.  [default: Wojdel's 31, or numbers from the upper left]",
+    option(
+        "--layout FILE.csv",
+        "Names and places of the markers.  [default: Wojdel's 31, or numbers from the upper left]",
+        options.FILE,
     ),
-    click.option(
-        "--region",
-        type=Numbers("LEFT,TOP,RIGHT,BOTTOM"),
-        metavar="L,T,R,B",
-        help="Part of the pictures, in pixels, that has the markers.",
+    option(
+        "--region L,T,R,B",
+        "Part of the pictures, in pixels, that has the markers.",
+        Numbers("LEFT,TOP,RIGHT,BOTTOM"),
     ),
 )
 
@@ -100,5 +97,5 @@ def follow(source: Path, look: Look, fps: float | None) -> Markers:
     from realizer.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
-    with options.progress(pictures, "markers", count) as shown:
+    with bar(pictures, count, "markers", least=2) as shown:
         return track_markers(shown, look, str(source), fps)

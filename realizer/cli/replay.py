@@ -5,25 +5,17 @@ from typing import Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
 from realizer.cli.realize import PICTURES, save, writer_for
 
 
 @click.command()
 @click.argument("record", type=click.Path(exists=True, path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    metavar="OUT",
-    help="File to write, in the format of its suffix.  [default: print the feedback]",
-)
-@click.option(
-    "--fps",
-    type=options.Number(0, 240, min_open=True),
-    help="Frames per second.  [default: that of the session]",
-)
+@option("-o --output OUT", "File to write, in the format of its suffix.  [default: print the feedback]")
+@option("--fps", "Frames per second.  [default: that of the session]", options.Number(0, 240, min_open=True))
 @options.face("Face instead of the recorded one")
-@click.option("--voice", metavar="NAME", help="Replace the voice.")
+@option("--voice NAME", "Replace the voice.")
 @options.at
 @options.size
 @options.camera
@@ -47,7 +39,7 @@ def replay(record: Path, output: str | None, **flags: Any) -> None:
 
     writer = writer_for(output)
     changes = {name: flags.pop(name) for name in ("fps", "face", "voice")}
-    with options.reporting(JournalError, wrong=click.ClickException):
+    with inputs.reporting(JournalError, wrong=click.ClickException):
         recording = read_recording(record)
         if writer is None or output is None:
             for text in replay_feedback(recording, **changes):

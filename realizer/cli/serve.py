@@ -1,22 +1,21 @@
 """`serve`: runs the service."""
 
 import os
-from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import warn_no_voice
 from realizer.core.settings import Settings
 
 LIMITS = tuple(f.name for f in fields(Settings) if f.name.startswith("max_"))
 
 
-def setting_option(
-    name: str, metavar: str, **attributes: Any
-) -> Callable[[options.Command], options.Command]:
+def setting_option(name: str, metavar: str, **attributes: Any) -> options.Decorator:
     """Return the option for a setting, with its description and default; `Settings` checks the value."""
     field = next(f for f in fields(Settings) if f.name == name)
     description, _, unset = field.metadata["description"].partition("; none: ")
@@ -26,7 +25,7 @@ def setting_option(
     return click.option(f"--{name.replace('_', '-')}", name, metavar=metavar, help=text, **attributes)
 
 
-def setting_options(*rows: tuple[str, str]) -> Callable[[options.Command], options.Command]:
+def setting_options(*rows: tuple[str, str]) -> options.Decorator:
     """Return a decorator that adds the options for several settings: (name, metavar) of each."""
     return options.several(*(setting_option(name, metavar) for name, metavar in rows))
 
@@ -54,19 +53,18 @@ def _served_face(value: str | None) -> str | None:
     ("hosts", "NAME,..."),
     ("allow", "ADDRESS,..."),
 )
-@click.option(
+@option(
     "--insecure",
-    is_flag=True,
+    "Listen beyond this machine without a token, or without --allow.",
     default=None,
-    help="Listen beyond this machine without a token, or without --allow.",
+    is_flag=True,
 )
-@click.option(
-    "--origin",
-    "origins",
+@option(
+    "--origin ADDRESS",
+    "Allow pages of this origin, such as https://example.org, to connect; may be repeated.",
+    name="origins",
     multiple=True,
-    metavar="ADDRESS",
     callback=lambda context, parameter, value: value or None,
-    help="Allow pages of this origin, such as https://example.org, to connect; may be repeated.",
 )
 @setting_options(("tls_cert", "FILE"), ("tls_key", "FILE"), ("log", "text|json"))
 @setting_option("asap_ports", "BML FEEDBACK", nargs=2)
@@ -92,16 +90,11 @@ def _served_face(value: str | None) -> str | None:
 @options.expressions
 @setting_option("edit", "DIR", type=click.Path(path_type=Path))
 @setting_option("seed", "N")
-@click.option("--idle/--no-idle", default=None, help="Blinks and small head motion of an idle face.")
-@options.liveliness
-@options.prosody
-@options.jaw
-@options.lips
-@options.cooccurrence
-@options.mapping
+@option("--idle/--no-idle", "Blinks and small head motion of an idle face.", default=None)
+@options.motion_options
 @options.strict_bml
 @setting_options(("grace", "N"), ("keep", "N"), ("drain", "N"), *((name, "N") for name in LIMITS))
-@click.option("--config", type=options.FILE, help="TOML file of settings: fps = 30 means --fps 30.")
+@option("--config", "TOML file of settings: fps = 30 means --fps 30.", options.FILE)
 def serve(config: Path | None, **flags: Any) -> None:
     """Run the service: play BML from clients, and stream frames, sound and feedback back.
 
@@ -118,10 +111,10 @@ def serve(config: Path | None, **flags: Any) -> None:
     from realizer.server.serve import serve as run_service
     from realizer.speech.registry import find_voice
 
-    with options.reporting(SettingsError):
+    with inputs.reporting(SettingsError):
         settings = Settings.read(flags, file=config)
     options.check_camera(settings.face, settings.camera)
     options.check_light(settings.light)
     find_voice(settings.voice).close()  # fails before a transport opens if the voice is not installed
-    options.warn_no_voice(settings.voice)
+    warn_no_voice(settings.voice)
     run(run_service(settings))

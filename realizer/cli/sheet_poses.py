@@ -1,27 +1,34 @@
-"""The poses that a face sheet shows."""
+"""The poses that a face sheet shows, and their pictures."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from PIL import Image, ImageDraw, ImageFont
 
 from realizer.animation.axis import au, axis, fap
+from realizer.animation.fap.conversion import FapMapping
 from realizer.animation.frames import AUFrames
-from realizer.core.array_types import Float32
+from realizer.animation.pose import poses as poses_of
+from realizer.core.array_types import Float32, UInt8
 from realizer.core.units import ANGLE_UNIT
 from realizer.emotions.wheel import wheel
 from realizer.expressions.expression import Expression
-from realizer.tables import by_number, faps
+from realizer.face.fap_mapping import mapping_of
+from realizer.face.load import input_names
+from realizer.outputs.output import RenderSettings
+from realizer.render.backdrop import backdrop
+from realizer.render.contact_sheet import INK, PAPER, Cell, Group, sheet
+from realizer.render.difference_image import MAX_DIFFERENCE, difference, faint, flatten, ramp
+from realizer.render.light import preset
+from realizer.render.renderer import Renderer
+from realizer.tables import Fap, by_number, faps
 from realizer.tables.control_groups import au_regions, fap_regions
 from realizer.tables.emotions import archetypes, ring
 from realizer.tables.lexemes import face_lexemes
 
-if TYPE_CHECKING:
-    from realizer.tables import Fap
-
+SCALE = (260, 16)  # pixels of the scale of colours
 HALF, TURN = 512, 34907  # half of the unit distance (Paul 2010, 4.4.2), and 20 degrees for rotations
 # Paul 2010, 6.4: the grid of his table of emotions.
 ANGLES, ACTIVATIONS = np.arange(0, 360.1, 22.5), (1, 3, 5, 7)
@@ -127,11 +134,6 @@ def of_emotions() -> list[Series]:
     ]
 
 
-def of_expressions(expressions: Sequence[Expression]) -> list[Pose]:
-    """Return each expression at full intensity."""
-    return [_pose(expression.aus, expression.name, expression.units) for expression in expressions]
-
-
 def _pose(aus: Mapping[tuple[int, str], float], title: str, note: str) -> Pose:
     """Return a pose of action units, (AU, side) -> intensity."""
     row = _nothing()
@@ -149,3 +151,61 @@ def _faps(values: Mapping[int, float]) -> Float32:
 
 def _nothing() -> Float32:
     return np.zeros(len(axis()), np.float32)
+
+
+def draw(
+    series: Sequence[Series],
+    face: tuple[str, str | None, FapMapping],
+    cameras: Sequence[str],
+    drawing: RenderSettings,
+    step: Callable[[int], object],
+) -> list[Group]:
+    """Return the pictures of all poses, each with its difference to the first pose, which is neutral.
+
+    Args:
+        face: its name, deformer and mapping.
+        step: called with 1 for each picture of a camera.
+    """
+    name, deformer, mapping = face
+    # A plain background, so that only the face differs.
+    behind = np.rint(np.array(preset(drawing.light).backdrop_middle) * 255)
+    if drawing.background:
+        behind = backdrop(drawing.size, preset(drawing.light), drawing.background)[..., :3]
+    rows = poses_of(frames(series), input_names(name, deformer=deformer), mapping)
+    pictures: list[list[Any]] = [[] for _ in rows]
+    look: dict[str, Any] = {"light": drawing.light, "background": "transparent", "deformer": deformer}
+    for camera in cameras:
+        neutral = below = None
+        with Renderer(name, drawing.size, camera, **look) as renderer:
+            for k, drawn in enumerate(renderer.frames(rows)):
+                picture = flatten(drawn, behind)
+                if neutral is None or below is None:
+                    neutral, below = picture, faint(drawn)
+                pictures[k] += [picture, difference(picture, neutral, below)]
+                step(1)
+    left = iter(pictures)
+    groups = []
+    for part in series:
+        cells = [Cell(next(left), pose.title, pose.notes) for pose in part.poses]
+        groups.append(Group(part.heading, cells, part.columns))
+    return groups
+
+
+def scale() -> UInt8:
+    """Return the scale of difference colours, (h, w, 3), with a label."""
+    width, height = SCALE
+    image = Image.new("RGB", (width, height * 2 + 8), PAPER)
+    bar = np.broadcast_to(ramp(np.linspace(0, 1, width, dtype=np.float32)), (height, width, 3))
+    image.paste(Image.fromarray(np.rint(bar).astype(np.uint8)), (0, 0))
+    text = f"differs by 0 .. {MAX_DIFFERENCE:.0%} of white or more"
+    ImageDraw.Draw(image).text((0, height + 4), text, INK, ImageFont.load_default(14))
+    return np.asarray(image)
+
+
+def draw_expressions(expressions: Sequence[Expression], notes: Sequence[str], face: str) -> UInt8:
+    """Return a contact sheet of expressions at full intensity, each with its note."""
+    series = Series("", [_pose(one.aus, one.name, one.units) for one in expressions])
+    rows = poses_of(frames([series]), input_names(face), mapping_of(face))
+    with Renderer(face, (220, 220), "close") as renderer:
+        pictures = renderer.draw(rows)
+    return sheet(list(pictures), [one.name for one in expressions], [(note,) for note in notes])

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import secrets
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
+from realizer.cli.options import option
+from realizer.cli.progress import counting, note
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from realizer.study.drawing import Variant
 
@@ -42,55 +41,35 @@ def _key(value: Path | None, answers: Sequence[Path]) -> Path:
     return found[0]
 
 
-@contextmanager
-def _progress(label: str, count: int) -> Iterator[Callable[[int], object]]:
-    with click.progressbar(length=count, label=label, file=sys.stderr, hidden=options.is_quiet()) as bar:
-        yield bar.update
-
-
 @study.command()
 @click.argument("folder", metavar="DIR", type=options.OUTPUT)
-@click.option(
+@option(
     "--kind",
-    "kinds",
-    multiple=True,
-    type=click.Choice(KINDS),
+    "Questions; may be repeated.  [default: visual and naming]",
+    click.Choice(KINDS),
     default=("visual", "naming"),
-    help="Questions; may be repeated.  [default: visual and naming]",
-)
-@click.option(
-    "--face", "faces", multiple=True, metavar="NAME", help="Face; several are compared.  [default: ada]"
-)
-@click.option(
-    "--deformer", "deformers", multiple=True, type=click.Choice(["mpeg4", "au"]), help="Several are compared."
-)
-@click.option(
-    "--mapping",
-    "mappings",
+    show_default=False,
+    name="kinds",
     multiple=True,
-    type=options.MappingFile(exists=True, dir_okay=False, path_type=Path),
-    help="Mapping of action units to FAPs; several are compared.",
 )
-@click.option(
-    "--references",
-    "source",
-    metavar="FOLDER|FACE",
-    help="To compare with: photographs with labels.csv (file,aus), or a face.  [default: another face]",
+@option("--face NAME", "Face; several are compared.  [default: ada]", name="faces", multiple=True)
+@option("--deformer", "Several are compared.", click.Choice(["mpeg4", "au"]), name="deformers", multiple=True)
+@option(
+    "--mapping",
+    "Mapping of action units to FAPs; several are compared.",
+    options.MAPPING,
+    name="mappings",
+    multiple=True,
 )
-@click.option("--judges", type=click.IntRange(1, 1000), default=10, show_default=True, help="Judges to come.")
-@click.option(
-    "--items", "most", type=click.IntRange(1), help="Draw so many questions of each kind.  [default: all]"
+@option(
+    "--references FOLDER|FACE",
+    "To compare with: photographs with labels.csv (file,aus), or a face.  [default: another face]",
+    name="source",
 )
-@click.option(
-    "--seed", type=click.IntRange(0), help="Seed of all choices.  [default: a random one, told in the key]"
-)
-@click.option(
-    "--language",
-    type=click.Choice(["en", "de", "pl"]),
-    default="en",
-    show_default=True,
-    help="First language of the page.",
-)
+@option("--judges", "Judges to come.", click.IntRange(1, 1000), default=10)
+@option("--items", "Draw so many questions of each kind.  [default: all]", click.IntRange(1), name="most")
+@option("--seed", "Seed of all choices.  [default: a random one, told in the key]", click.IntRange(0))
+@option("--language", "First language of the page.", click.Choice(["en", "de", "pl"]), default="en")
 def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **what: Any) -> None:
     """Write DIR, which opens in any browser, and its right answers to DIR.key.json beside it.
 
@@ -100,23 +79,21 @@ def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **
     from realizer.study.plan import Plan
     from realizer.tracking.network import TrackingError
 
-    with options.reporting(ValueError):
+    with inputs.reporting(ValueError):
         check_folder(folder)
     variants = _variants(what.pop("faces"), what.pop("deformers"), what.pop("mappings"))
     plan = Plan(kinds, variants, seed=secrets.randbelow(2**32) if seed is None else seed, **what)
-    with options.reporting(TrackingError), _progress("drawing", plan.drawn) as step:
+    with inputs.reporting(TrackingError), counting("drawing", plan.drawn) as step:
         items = plan.items(step)
     about = {"judges": judges, "language": plan.language, "seed": plan.seed}
-    with options.writing(folder), options.reporting(ValueError):
+    with inputs.opening(folder), inputs.reporting(ValueError):
         key = write_kit(folder, items, about | {"variants": [one.name for one in variants]})
-    options.note(f"{folder}: {len(items)} questions; open {folder / 'index.html'}; the right answers: {key}")
+    note(f"{folder}: {len(items)} questions; open {folder / 'index.html'}; the right answers: {key}")
 
 
 @study.command()
 @click.argument("folder", metavar="DIR", type=options.FOLDER)
-@click.option(
-    "-o", "--output", required=True, metavar="FILE.csv", type=options.OUTPUT, help="Answers to write."
-)
+@option("-o --output FILE.csv", "Answers to write.", options.OUTPUT, required=True)
 def judge(folder: Path, output: Path) -> None:
     """Answer the study in DIR by a machine, from its pictures alone; its answers are marked.
 
@@ -127,27 +104,23 @@ def judge(folder: Path, output: Path) -> None:
     from realizer.study import judge as machine
     from realizer.study.answers import COLUMNS
 
-    options.check_suffix(output, ".csv")
+    inputs.check_suffix(output, ".csv")
     count = len(machine.read_items(folder)["items"])
-    with _progress("judging", count) as step:
+    with counting("judging", count) as step:
         rows = list(machine.judge(folder, step))
     if not rows:
         raise click.UsageError(f"{folder}: wanted questions about matching or naming, got none of them")
-    with options.writing(output):
+    with inputs.opening(output):
         write_text(output, csv_text(COLUMNS, rows))
-    options.note(f"{output}: {len(rows)} of {count} questions answered")
+    note(f"{output}: {len(rows)} of {count} questions answered")
 
 
 @study.command()
 @click.argument("files", metavar="ANSWERS.csv...", nargs=-1, required=True, type=options.FILE)
-@click.option(
-    "--key", type=options.FILE, help="Right answers.  [default: the only *.key.json beside the answers]"
-)
-@click.option("-o", "--output", required=True, metavar="DIR", type=options.OUTPUT, help="Folder to write.")
-@click.option(
-    "--pictures", metavar="DIR", type=options.FOLDER, help="Folder of the study.  [default: beside the key]"
-)
-@click.option("--keep", is_flag=True, help="Count judges who failed attention items, too.")
+@option("--key", "Right answers.  [default: the only *.key.json beside the answers]", options.FILE)
+@option("-o --output DIR", "Folder to write.", options.OUTPUT, required=True)
+@option("--pictures DIR", "Folder of the study.  [default: beside the key]", options.FOLDER)
+@option("--keep", "Count judges who failed attention items, too.", is_flag=True)
 def analyse(
     files: tuple[Path, ...], key: Path | None, output: Path, pictures: Path | None, keep: bool
 ) -> None:
@@ -167,9 +140,9 @@ def analyse(
         click.echo(f"failed attention items, {'kept' if keep else 'left out'}: {named}", err=True)
     if not keep and len(failed) == len({(one.who, one.judge) for one in answers}):
         raise click.UsageError("wanted answers of a judge who passed the attention items; see --keep")
-    with options.writing(output):
+    with inputs.opening(output):
         names = write_report(output, truths, answers, pictures or key.parent / truths["folder"], keep)
-    options.note(f"{output}: {', '.join(names)}")
+    note(f"{output}: {', '.join(names)}")
 
 
 def _variants(faces: Sequence[str], deformers: Sequence[str], mappings: Sequence[Path]) -> list[Variant]:

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
 from realizer.cli.realize import output_options, play_documents
 
 if TYPE_CHECKING:
@@ -54,8 +54,8 @@ def timeline(file: Path, **flags: Any) -> int:
 
     if flags["media"] is not None:
         raise click.BadParameter("a timeline refers to no files", param_hint="--media")
-    options.check_suffix(file, *SUFFIXES)
-    chosen = options.settings(expressions=flags["expressions"])
+    inputs.check_suffix(file, *SUFFIXES)
+    chosen = inputs.settings(expressions=flags["expressions"])
     if faults := list(faults_in(file.read_bytes(), library_of(chosen.expressions))):
         for fault in faults:
             click.echo(f"{file}: {fault}", err=True)

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
-from realizer.cli import options
+from realizer.cli import inputs, options
 from realizer.cli.marker_options import follow as follow_markers
 from realizer.cli.marker_options import look_of, marker_options
+from realizer.cli.options import option
+from realizer.cli.progress import bar, note
 
 if TYPE_CHECKING:
     from realizer.core.array_types import Float64
@@ -25,38 +27,21 @@ POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of st
 
 @click.command()
 @click.argument("source", metavar="IN", type=click.Path(exists=True, allow_dash=True))
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="OUT",
-    type=options.OUTPUT,
-    help="File to write: .fap, .csv, .json, .bml.",
-)
-@click.option(
+@option("-o --output OUT", "File to write: .fap, .csv, .json, .bml.", options.OUTPUT, required=True)
+@option(
     "--fps",
-    type=options.Number(0.1, 1000),
-    help="Frame rate of points and of a folder of pictures, and of OUT.  [default: the film's, or 25]",
+    "Frame rate of points and of a folder of pictures, and of OUT.  [default: the film's, or 25]",
+    options.Number(0.1, 1000),
 )
-@click.option(
+@option(
     "--profiles",
-    type=options.ProfileSet(),
-    help="Also print which emotions are recognised by these profiles (own, published, raw or a file), when "
+    "Also print which emotions are recognised by these profiles (own, published, raw or a file), when "
     "and how certainly.",
+    options.ProfileSet(),
 )
-@click.option(
-    "--face", metavar="NAME", help="Make the FAPs from the action units, by the mapping of this face."
-)
-@click.option(
-    "--neutral", metavar="N|PICTURE", help="The face at rest: a picture, or picture N (from 0) of IN."
-)
-@click.option(
-    "--person",
-    type=click.IntRange(1),
-    default=1,
-    show_default=True,
-    help="Which of several people; 1 is seen most.",
-)
+@option("--face NAME", "Make the FAPs from the action units, by the mapping of this face.")
+@option("--neutral N|PICTURE", "The face at rest: a picture, or picture N (from 0) of IN.")
+@option("--person", "Which of several people; 1 is seen most.", click.IntRange(1), default=1)
 @marker_options
 def track(source: str, output: Path, fps: float | None, profiles: str | None, **how: Any) -> None:
     """Convert a film, a picture, a folder of pictures, or tracked feature points to movements of a face.
@@ -84,7 +69,7 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
         text, rate, values, seen = _from_points(source, output, fps or 25.0)
     else:
         text, rate, values, seen = _from_pictures(Path(source), output, fps, **how)
-    with options.writing(output):
+    with inputs.opening(output):
         write_bytes(output, text.encode())
     if profiles is not None:
         from realizer.analysis.recognise import recogniser
@@ -106,13 +91,13 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
     from realizer.animation.frames import FAPFrames
     from realizer.outputs.fap_text import encode
 
-    options.check_suffix(output, ".fap")
-    text = options.decode(options.read_file(source), source, "a table")
-    with options.reporting(ValueError):
+    inputs.check_suffix(output, ".fap")
+    text = inputs.decode(inputs.read_file(source), source, "a table")
+    with inputs.reporting(ValueError):
         moving, rest = read_points(text, source)
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, source))
     times = np.arange(len(values)) / fps
-    options.note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
+    note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
     return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen
 
 
@@ -121,14 +106,14 @@ def _from_markers(source: Path, output: Path, fps: float | None, look: Look, fac
     from realizer.tracking.markers.film import FORMATS, faps_of
     from realizer.tracking.network import TrackingError
 
-    options.check_suffix(output, *FORMATS)
-    with options.reporting(TrackingError):
+    inputs.check_suffix(output, *FORMATS)
+    with inputs.reporting(TrackingError):
         markers = follow_markers(source, look, fps)
         text = FORMATS[output.suffix.lower()](markers, face, output.stem)
         known = len([name for name in markers.layout.feature_points if name]) > 1
         faps, seen = faps_of(markers, face) if known else (None, None)
     found = f"{len(markers.layout)} markers, {markers.seen.mean():.1%} of them seen"
-    options.note(f"{output}: {len(markers.points)} frames, {found}")
+    note(f"{output}: {len(markers.points)} frames, {found}")
     return text, markers.fps, faps, seen
 
 
@@ -148,13 +133,13 @@ def _from_pictures(
     from realizer.tracking.recording import rate_of, record
     from realizer.tracking.unfinished import Unfinished
 
-    with options.reporting(TrackingError):
+    with inputs.reporting(TrackingError):
         number = int(neutral) if neutral is not None and neutral.isdecimal() else None
         look = look_of(source, chosen, number)
     if look is not None:
         return _from_markers(source, output, fps, look, face or "default")
-    options.check_suffix(output, *FORMATS)
-    with options.reporting(TrackingError):
+    inputs.check_suffix(output, *FORMATS)
+    with inputs.reporting(TrackingError):
         kept = Unfinished(output.with_name(f"{output.name}.part"), source) if source.is_file() else None
         times, people = follow(source, fps, kept)
         if person > len(people):
@@ -165,9 +150,7 @@ def _from_pictures(
     if face is not None:
         recording = by_mapping(recording, face)
     others = f"; {len(people)} people, this is --person {person}" if len(people) > 1 else ""
-    options.note(
-        f"{output}: {len(recording.times)} frames, the face is in {recording.seen.mean():.0%}{others}"
-    )
+    note(f"{output}: {len(recording.times)} frames, the face is in {recording.seen.mean():.0%}{others}")
     text = FORMATS[output.suffix.lower()](recording, output.stem)
     if kept is not None:
         kept.remove()
@@ -183,7 +166,7 @@ def follow(
     from realizer.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
-    with options.progress(pictures, "tracking", count) as shown:
+    with bar(pictures, count, "tracking", least=2) as shown:
         times, people = follow(shown, kept)
     if not people:
         raise TrackingError(
@@ -215,7 +198,7 @@ def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
     from realizer.face.features import fapu_of
 
     try:
-        with options.reporting(FaceError):
+        with inputs.reporting(FaceError):
             return fapu_of({name: place.astype(np.float32) for name, place in rest.items()}, where)
     except KeyError as missing:
         raise click.UsageError(

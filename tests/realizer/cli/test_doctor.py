@@ -1,17 +1,19 @@
-"""Tests of `realizer doctor`."""
+"""Tests of `realizer doctor` and `realizer plugins`; tests/test_plugins.py installs some plug-ins."""
 
 from __future__ import annotations
 
 import json
 import shutil
 import sys
+from importlib.metadata import EntryPoint, EntryPoints
 
 import numpy as np
 import pytest
 
 from realizer.cli.doctor import _fix
+from realizer.core import registry
 from realizer.outputs.registry import OUTPUTS
-from realizer.speech.registry import voices
+from realizer.speech.registry import VOICES, voices
 from tests.commands import run
 
 
@@ -86,3 +88,43 @@ def test_doctor_prints_json_with_versions(monkeypatch: pytest.MonkeyPatch) -> No
     parts = {part["part"]: part for part in found["parts"]}
     assert {"pictures", "FFmpeg", "silent", "node", "face", "page"} <= set(parts)
     assert parts["pictures"] == {"part": "pictures", "works": True, "text": "drawn by OpenGL"}
+
+
+@pytest.fixture
+def points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Entry points: a voice that works, one that does not, and one whose name is taken."""
+    rows = {"quiet": "realizer.speech.silent:SilentVoice", "torn": "no_such_module:X", "espeak": "x:Y"}
+    found = EntryPoints(EntryPoint(name, value, "realizer.voices") for name, value in rows.items())
+    monkeypatch.setattr(registry, "_installed", lambda: found)
+    monkeypatch.delitem(VOICES.__dict__, "_plugins", raising=False)
+
+
+def test_plugins_says_that_there_are_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "_installed", lambda: EntryPoints(()))
+    done = run("plugins")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert "no plug-ins are installed" in done.stderr
+
+
+def test_plugins_lists_those_that_work_and_why_others_do_not(
+    points: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = {line.split()[1]: line for line in run("plugins").stdout.splitlines()}
+    monkeypatch.delitem(VOICES.__dict__, "_plugins")
+    assert list(lines) == ["espeak", "quiet", "torn"]
+    assert lines["quiet"].endswith("realizer.speech.silent:SilentVoice")
+    assert "(not used: its name is taken)" in lines["espeak"]
+    assert "cannot be imported: ModuleNotFoundError" in lines["torn"]
+
+
+def test_plugins_prints_json(points: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows = json.loads(run("plugins", "--json").stdout)
+    monkeypatch.delitem(VOICES.__dict__, "_plugins")
+    assert [row["name"] for row in rows] == ["espeak", "quiet", "torn"]
+    assert rows[1] == {
+        "group": "realizer.voices",
+        "name": "quiet",
+        "package": "",
+        "value": "realizer.speech.silent:SilentVoice",
+        "fault": "",
+    }
