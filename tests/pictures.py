@@ -9,10 +9,9 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.face.deform import complete_poses
 from realizer.face.load import load_face
-from realizer.render.backends import open_canvas
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.worker import shapes
+from realizer.render.worker import open_canvas, shapes
 
 __all__ = ["drawn_here"]
 

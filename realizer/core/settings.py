@@ -3,7 +3,7 @@
 import ipaddress
 import os
 import socket
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
@@ -261,37 +261,30 @@ class Settings:
             except ValueError as wanted:
                 got = "something else" if f.metadata["secret"] else repr(value)
                 raise SettingsError(f"setting {f.name}: wanted {wanted}, got {got}", f.name) from None
-        own = self.library_folder
-        if own is not None and self.expressions is not None and self.expressions.resolve() != own.resolve():
-            words = f"wanted no other folder of expressions than {own}, got {self.expressions} too"
-            raise SettingsError(f"setting edit: {words}", "edit")
+        for name, words in self._conflicts():
+            raise SettingsError(f"setting {name}: wanted {words}", name)
+
+    def _conflicts(self) -> Iterator[tuple[str, str]]:
+        """Yield settings that do not go with others, and what was wanted."""
+        own, others = self.library_folder, self.expressions
+        if own is not None and others is not None and others.resolve() != own.resolve():
+            yield "edit", f"no other folder of expressions than {own}, got {others} too"
         if self.tls_key is not None and self.tls_cert is None:
-            raise SettingsError("setting tls_key: wanted tls_cert too, got none", "tls_key")
+            yield "tls_key", "tls_cert too, got none"
         if self.workers > 1 and not hasattr(socket, "send_fds"):
-            words = f"wanted 1, got {self.workers}: processes of this system cannot share a port"
-            raise SettingsError(f"setting workers: {words}", "workers")
+            yield "workers", f"1, got {self.workers}: processes of this system cannot share a port"
         if self.tls_cert is not None and self.workers > 1:
-            raise SettingsError(
-                f"setting tls_cert: wanted workers = 1, got {self.workers}: connections are distributed to "
-                "workers by their first line; use TLS in a proxy in front of the service",
-                "tls_cert",
-            )
+            why = "connections are distributed to workers by their first line; use TLS in a proxy in front of"
+            yield "tls_cert", f"workers = 1, got {self.workers}: {why} the service"
         if self.jwt_audience is not None and self.jwt_key is None:
-            raise SettingsError("setting jwt_audience: wanted jwt_key too, got none", "jwt_audience")
-        if not is_loopback(self.host) and not self.insecure:
-            if self.token is None and self.jwt_key is None:
-                raise SettingsError(
-                    "setting host: wanted token, jwt_key or insecure too, because other machines can reach "
-                    f"{self.host}",
-                    "host",
-                )
-            tokenless = [name for name in ("asap_ports", "xface_port") if getattr(self, name) is not None]
-            if tokenless and not self.allow:
-                raise SettingsError(
-                    f"setting {tokenless[0]}: wanted allow or insecure too, or host 127.0.0.1: its clients "
-                    "cannot send the token",
-                    tokenless[0],
-                )
+            yield "jwt_audience", "jwt_key too, got none"
+        if is_loopback(self.host) or self.insecure:
+            return
+        if self.token is None and self.jwt_key is None:
+            yield "host", f"token, jwt_key or insecure too, because other machines can reach {self.host}"
+        for name in ("asap_ports", "xface_port"):
+            if getattr(self, name) is not None and not self.allow:
+                yield name, "allow or insecure too, or host 127.0.0.1: its clients cannot send the token"
 
     @property
     def library_folder(self) -> Path | None:

@@ -50,5 +50,4 @@ ARKIT_CSV = Output(
     "text/csv",
     "a row a frame: ARKit's 52 weights as Live Link Face writes them",
     lambda made, _: encode_arkit_csv(arkit(made.aus, made.mapping), made.fps).encode(),
-    reader="openfacefx",
 )

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from realizer.animation.axis import AU_NAMES
-from realizer.outputs.output import Output
+from realizer.outputs.output import text_output
 from realizer.realization import Realization
 from realizer.tables import faps
 
@@ -29,9 +29,4 @@ def encode_csv(realization: Realization) -> str:
     )
 
 
-CSV = Output(
-    ".csv",
-    "text/csv",
-    "a row a frame: time, action units, FAPs",
-    lambda realization, _: encode_csv(realization).encode(),
-)
+CSV = text_output(".csv", "text/csv", "a row a frame: time, action units, FAPs", encode_csv)

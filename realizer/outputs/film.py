@@ -195,16 +195,7 @@ def _output(suffix: str, media_type: str, description: str) -> Output:
             write_film(realization, path, drawing)
             return path.read_bytes()
 
-    return Output(
-        suffix,
-        media_type,
-        description,
-        encode,
-        ("render", "film"),
-        _picture_size,
-        save=write_film,
-        reader="av",
-    )
+    return Output(suffix, media_type, description, encode, ("render", "film"), _picture_size, save=write_film)
 
 
 MP4 = _output(".mp4", "video/mp4", "film with sound and subtitles, H.264 and AAC")

@@ -6,11 +6,10 @@ import numpy as np
 
 from realizer.face.glb_file import GlbFile
 from realizer.face.model import Face
-from realizer.outputs.arkit_targets import make_arkit_targets
 from realizer.outputs.avatar import read_avatar
 from realizer.outputs.avatar_glb import encode_avatar
 from realizer.outputs.glb_mesh import GlbMesh
-from realizer.outputs.morph_targets import MorphTargets, make_morph_targets
+from realizer.outputs.morph_targets import MorphTargets, make_arkit_targets, make_morph_targets
 from realizer.outputs.output import Output, RenderSettings
 from realizer.outputs.rotations import quaternions
 from realizer.realization import Realization
@@ -83,9 +82,5 @@ def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
 
 
 GLB = Output(
-    ".glb",
-    "model/gltf-binary",
-    "the head, animated: textures, morph targets, head and eyes",
-    _encode,
-    reader="trimesh",
+    ".glb", "model/gltf-binary", "the head, animated: textures, morph targets, head and eyes", _encode
 )

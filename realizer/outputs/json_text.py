@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from realizer.outputs.output import Output
+from realizer.outputs.output import text_output
 from realizer.realization import Realization
 
 
@@ -21,10 +21,10 @@ def encode_json(realization: Realization) -> str:
     return json_line(realization.to_json())
 
 
-JSON = Output(
+JSON = text_output(
     ".json",
     "application/json",
     "schedule, FAPs, AUs, feedback and warnings",
-    lambda realization, _: encode_json(realization).encode(),
+    encode_json,
     all_characters=True,
 )

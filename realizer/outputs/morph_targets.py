@@ -1,4 +1,4 @@
-"""Morph targets and weights that reproduce a face's poses within a tolerance."""
+"""Morph targets and weights that show a face's poses: within a tolerance, or by ARKit's 52 shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit, shape_faps
 from realizer.animation.axis import fap
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.model import Face
+from realizer.realization import Realization
 
 HEAD = (48, 49, 50)  # FAPs that turn the head: pitch, yaw, roll
 EYES = ((25, 23), (26, 24))  # FAPs that turn the eyeballs: pitch and yaw of the left, of the right
@@ -139,3 +141,34 @@ def _components(left: Float64) -> Float64:
         if np.linalg.norm(rest.reshape(len(left), -1, 3), axis=2).max() <= TOLERANCE / 2:
             return np.asarray(axes[:k])
     return np.asarray(axes)
+
+
+def make_arkit_targets(realization: Realization) -> MorphTargets:
+    """Return ARKit's 52 shapes of the first character's face, and the weights that come nearest to it.
+
+    Each shape is what the FAPs of its action unit make of the face. Head and eyeballs turn by joints.
+    """
+    from realizer.face.deform import deform
+
+    face, frames = realization.face, arkit(realization.aus, realization.mapping)
+    rows = shape_faps(realization.mapping).astype(np.float32)
+    rows[:, [fap - 1 for fap in HEAD]] = 0
+    balls = np.zeros(len(face.vertices), bool)
+    eyes = frames.eyes[..., ::-1].copy()
+    for eye, ((first, last), _) in enumerate(face.basis["eyes"]):
+        balls[first:last] = True
+        if last > first:
+            rows[:, [fap - 1 for fap in EYES[eye]]] = 0
+        else:
+            eyes[:, eye] = 0
+    moves = deform(face, rows) - face.vertices
+    moves[:, balls] = 0
+    moves[np.abs(moves).max(axis=2) < NEGLIGIBLE] = 0
+    return MorphTargets(
+        ARKIT_NAMES(),
+        moves.astype(np.float32),
+        frames.weights,
+        frames.head[:, [1, 0, 2]],
+        eyes,
+        np.zeros((len(eyes), 2), np.float32),
+    )

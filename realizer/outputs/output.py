@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 from pathlib import Path
+from typing import Any
 
 from realizer.core.array_types import UInt8
 from realizer.core.atomic_files import write_bytes
@@ -137,7 +138,6 @@ class Output:
             it has no pictures.
         all_characters: whether it contains all characters; otherwise only the first.
         save: writes a file piece by piece, if it may be too long for memory.
-        reader: the foreign program that reads it in the tests; "" if none.
     """
 
     suffix: str
@@ -148,7 +148,6 @@ class Output:
     picture_size: Callable[[RenderSettings], tuple[tuple[int, int], bool]] | None = None
     all_characters: bool = False
     save: Callable[[Realization, Path, RenderSettings], None] | None = None
-    reader: str = ""
 
     def check(self, drawing: RenderSettings, realization: Realization | None = None) -> None:
         """Check that settings suit this format.
@@ -214,3 +213,10 @@ class Output:
         renderer = drawing.make_renderer_for(face, deformer, size, alpha=alpha)
         renderer.start()
         return replace(drawing, renderer=renderer)
+
+
+def text_output(
+    suffix: str, media_type: str, description: str, encode: Callable[[Realization], str], **attributes: Any
+) -> Output:
+    """Return the output of a text, which needs no settings; further attributes as of `Output`."""
+    return Output(suffix, media_type, description, lambda made, _: encode(made).encode(), **attributes)

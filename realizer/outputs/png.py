@@ -106,11 +106,5 @@ def _points(realization: Realization, count: int) -> dict[int, tuple[str, ...]]:
 
 
 PNG = Output(
-    ".png",
-    "image/png",
-    "a contact sheet over time, or one instant",
-    _encode,
-    ("render",),
-    _picture_size,
-    reader="PIL",
+    ".png", "image/png", "a contact sheet over time, or one instant", _encode, ("render",), _picture_size
 )

@@ -12,7 +12,7 @@ OUTPUTS: Registry[Output] = Registry(
         ".json": "realizer.outputs.json_text:JSON",
         ".csv": "realizer.outputs.csv_table:CSV",
         ".vtt": "realizer.outputs.vtt:VTT",
-        ".srt": "realizer.outputs.srt:SRT",
+        ".srt": "realizer.outputs.vtt:SRT",
         ".textgrid": "realizer.outputs.textgrid:TEXTGRID",
         ".wav": "realizer.outputs.wav:WAV",
         ".png": "realizer.outputs.png:PNG",

@@ -4,7 +4,7 @@ from typing import Any
 
 from realizer.outputs import speech_spans
 from realizer.outputs.json_text import json_line
-from realizer.outputs.output import Output
+from realizer.outputs.output import text_output
 from realizer.realization import Realization
 
 REST, TONGUE = "X", "H"
@@ -45,10 +45,9 @@ def _shape(viseme: int, ipa: str) -> str:
     return TONGUE if "l" in ipa else SHAPES[viseme]
 
 
-RHUBARB = Output(
+RHUBARB = text_output(
     ".rhubarb.json",
     "application/json",
     "mouth shapes A to H and X as Rhubarb Lip Sync writes them",
-    lambda realization, _: encode_rhubarb(realization).encode(),
-    reader="openfacefx",
+    encode_rhubarb,
 )

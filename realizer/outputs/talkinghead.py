@@ -11,7 +11,7 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.lips.viseme_weights import oculus_visemes
 from realizer.outputs import speech_spans
 from realizer.outputs.json_text import json_line
-from realizer.outputs.output import Output
+from realizer.outputs.output import text_output
 from realizer.outputs.speech_spans import Span
 from realizer.realization import Realization
 
@@ -86,10 +86,9 @@ def _ms(seconds: float) -> float:
     return round(seconds * 1000, 1)
 
 
-TALKINGHEAD = Output(
+TALKINGHEAD = text_output(
     ".talkinghead.json",
     "application/json",
     "words, visemes, face and sound for TalkingHead",
-    lambda realization, _: encode_talkinghead(realization).encode(),
-    reader="talkinghead.html",
+    encode_talkinghead,
 )

@@ -5,7 +5,7 @@ from itertools import groupby
 from typing import Protocol
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Output
+from realizer.outputs.output import text_output
 from realizer.outputs.speech_spans import Span
 from realizer.realization import Realization
 
@@ -111,11 +111,10 @@ def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"'
 
 
-TEXTGRID = Output(
+TEXTGRID = text_output(
     ".textgrid",
     "text/x-textgrid",
     "words, phonemes and sync points for Praat",
-    lambda realization, _: encode_textgrid(realization).encode(),
+    encode_textgrid,
     all_characters=True,
-    reader="praatio",
 )

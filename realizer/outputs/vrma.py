@@ -131,5 +131,4 @@ VRMA = Output(
     "model/gltf-binary",
     "expressions, head and gaze for VRM avatars",
     lambda realization, _: encode_vrma(realization),
-    reader="vrma.mjs",
 )

@@ -1,9 +1,10 @@
-"""The output .vtt: words, phonemes and sync points as WebVTT cues."""
+"""The outputs .vtt (words, phonemes and sync points as WebVTT cues) and .srt (captions)."""
 
 import html
 
 from realizer.outputs import speech_spans
-from realizer.outputs.output import Output
+from realizer.outputs.captions import captions
+from realizer.outputs.output import text_output
 from realizer.realization import Realization
 
 LEAST = 0.001  # s; WebVTT requires cues to end after their start, and counts milliseconds
@@ -38,11 +39,24 @@ def timestamp(seconds: float) -> str:
     return f"{minutes // 60:02}:{minutes % 60:02}:{milliseconds // 1000:02}.{milliseconds % 1000:03}"
 
 
-VTT = Output(
-    ".vtt",
-    "text/vtt",
-    "words, phonemes and sync points as WebVTT cues",
-    lambda realization, _: encode_vtt(realization).encode(),
-    all_characters=True,
-    reader="webvtt",
+VTT = text_output(
+    ".vtt", "text/vtt", "words, phonemes and sync points as WebVTT cues", encode_vtt, all_characters=True
+)
+
+
+def encode_srt(realization: Realization) -> str:
+    """Return numbered captions; simultaneous speech is in separate lines of one caption."""
+    last = realization.duration
+    return "\n".join(
+        f"{number}\n{_clock(shown.start)} --> {_clock(min(shown.end, last))}\n{shown.text}\n"
+        for number, shown in enumerate(captions(realization), 1)
+    )
+
+
+def _clock(seconds: float) -> str:
+    return timestamp(seconds).replace(".", ",")
+
+
+SRT = text_output(
+    ".srt", "application/x-subrip", "captions as SubRip subtitles", encode_srt, all_characters=True
 )

@@ -26,5 +26,4 @@ WAV = Output(
     "the sound, 16 bit mono, 22,050 Hz",
     lambda realization, _: encode_wav(realization.sound(RATE), RATE),
     all_characters=True,
-    reader="wave",
 )

@@ -71,5 +71,4 @@ WEBP = Output(
     _encode,
     ("render",),
     lambda drawing: (drawing.size, False),
-    reader="PIL",
 )

@@ -1,4 +1,4 @@
-"""Draws a mesh on the processor: what each sample of a picture sees, and the light from there."""
+"""The software backend: what each sample of a picture sees, and the light from there, by the processor."""
 
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -10,11 +10,14 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 from realizer.core.colours import linear
 from realizer.face.drawn_mesh import DrawnMesh
+from realizer.render.canvas import Canvas
 from realizer.render.lamp_view import SIDE, LampView
+from realizer.render.light import Light, unit
 from realizer.render.lighting import light_band
 from realizer.render.shading import tone_curve
 from realizer.render.surfaces import surfaces
 from realizer.render.textures import CHANNELS, Texels
+from realizer.render.uniforms import mirrored_of
 from realizer.render.visibility import SAMPLES, fill
 
 MAX_THREADS = 4
@@ -109,3 +112,34 @@ def _room() -> tuple[Any, Any]:
     """Return arrays for a thread to work in: two of whole numbers and two of values, one a sample."""
     values = np.empty(len(SAMPLES), np.float32), np.empty(CHANNELS, np.float32)
     return (np.empty(len(SAMPLES), np.int64), np.empty(len(SAMPLES), np.int64)), values
+
+
+class SoftwareCanvas(Canvas):
+    """A head drawn by the processor."""
+
+    def _open(self) -> None:
+        self._raster = Raster(self._size, self._mesh, linear(self._mesh.colours), self._texels, self._lamp)
+        self._lights = lights_of(self._light)
+        self._eye = self._camera.position.astype(np.float32)
+
+    def _pixels(self) -> UInt8:
+        points, distances = self._camera.project(self._moving[:, :3], self._size)
+        # Parts of a head do not come near the lens; those of a broken one are not drawn.
+        nearness = np.where(distances > self._camera.near, 1 / distances, np.nan).astype(np.float32)
+        return self._raster(points, nearness, self._moving, self._lights, self._eye)
+
+    def close(self) -> None:
+        """End its threads."""
+        self._raster.close()
+
+
+def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32, Float32]:
+    """Return a light as `shading.reflected` takes it: lamps, environment, rim lamp's power, glint."""
+    lamps = [
+        [unit(lamp.direction), np.multiply(lamp.colour, light.exposure)] for lamp in (light.key, light.rim)
+    ]
+    exposure = np.float32(light.exposure)
+    return (
+        np.array(lamps, np.float32), light.environment.sh * exposure, mirrored_of(light),
+        np.float32(light.rim_power), np.array([light.glint, light.glint_width], np.float32),
+    )  # fmt: skip

@@ -1,9 +1,10 @@
-"""The drawing process: poses on stdin, pixels in shared memory, files on stdout."""
+"""The drawing process: poses on stdin, pixels in shared memory, files on stdout; by OpenGL or without it."""
 
 import os
 import sys
 from collections.abc import Iterator, Mapping
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 import numpy as np
 
@@ -11,10 +12,59 @@ from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RealizerError, RenderError
 from realizer.face.model import Face, Fapu
 from realizer.render.backdrop import channels
-from realizer.render.backends import open_canvas
-from realizer.render.cameras import camera_for
-from realizer.render.light import preset
+from realizer.render.cameras import Camera, camera_for
+from realizer.render.canvas import Canvas
+from realizer.render.light import Light, preset
 from realizer.render.process_messages import Failed, Open, Pixels, connection
+
+BACKENDS = ("auto", "gl", "onboard")
+# Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,
+# less than half as fast as we do.
+CARDS = ("dri/renderD*", "nvidia[0-9]*", "dxg")
+
+
+def open_canvas(
+    face: Face,
+    size: tuple[int, int],
+    camera: Camera,
+    light: Light,
+    background: str | None = None,
+    backend: str = "auto",
+) -> tuple[str, Canvas]:
+    """Return the name of the backend that works, and its canvas.
+
+    Args:
+        background: as `realizer.render.backdrop.backdrop` takes it.
+        backend: one of BACKENDS; "auto" selects the faster one here, or the other if that is missing.
+
+    Raises:
+        RenderError: unknown backend, or it is missing here; the text says what to install.
+    """
+    if backend not in BACKENDS:
+        raise RenderError(f"drawing: wanted one of {', '.join(BACKENDS)}, got {backend!r}")
+    faults = []
+    for name in _order(Path("/dev")) if backend == "auto" else (backend,):
+        try:
+            return name, _canvas(name)(face, size, camera, light, background)
+        except RenderError as error:
+            faults.append(str(error))
+    raise RenderError("; or: ".join(faults))
+
+
+def _order(devices: Path) -> tuple[str, ...]:
+    card = any(any(devices.glob(pattern)) for pattern in CARDS)
+    return ("gl", "onboard") if card else ("onboard", "gl")
+
+
+def _canvas(backend: str) -> type[Canvas]:
+    if backend == "gl":
+        from realizer.render.opengl import OpenGLCanvas
+
+        return OpenGLCanvas
+    from realizer.render.raster import SoftwareCanvas
+
+    return SoftwareCanvas
+
 
 BATCH = 16  # frames deformed in one call: many share its fixed cost, and few stay in the processor's cache
 # Pillow's fastest options for streams. A PNG of level 1 is a fifth larger than one of the default level 6.

@@ -50,9 +50,9 @@ def frames(shown: list[Mapping[int, float]]) -> AUFrames:
 
 def pictures(face: Face, views: tuple[str, ...], shapes: Callable[[], list[Any]]) -> np.ndarray:
     """Return pictures of (n, n_vertices, 3) shapes, one row for each view."""
-    from realizer.render.backends import open_canvas
     from realizer.render.cameras import camera_for
     from realizer.render.light import preset
+    from realizer.render.worker import open_canvas
 
     bands = []
     for view in views:

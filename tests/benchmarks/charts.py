@@ -21,8 +21,8 @@ from stopwatch import handle_help, median, noise
 
 from realizer.charts.chart_data import charts_of
 from realizer.charts.picture import timeline
-from realizer.charts.raster import png
 from realizer.charts.svg import svg
+from realizer.charts.write_chart import png
 from realizer.core.options import PlayOptions
 from realizer.pipeline import plan
 from realizer.playback.player import Player

@@ -25,14 +25,13 @@ from realizer.face.drawn_mesh import drawn_mesh
 from realizer.face.load import load_face
 from realizer.face.surface import normals
 from realizer.outputs.film import FORMATS, RATE, encode_film
-from realizer.render.backends import BACKENDS
 from realizer.render.cameras import camera_for
 from realizer.render.drawing_process import unavailable_reason
 from realizer.render.light import preset
 from realizer.render.opengl import OpenGLCanvas
+from realizer.render.raster import SoftwareCanvas
 from realizer.render.renderer import Renderer
-from realizer.render.software import SoftwareCanvas
-from realizer.render.worker import encode
+from realizer.render.worker import BACKENDS, encode
 
 # Spoken by the silent voice in about ten seconds.
 TEXT = (

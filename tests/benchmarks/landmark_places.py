@@ -25,7 +25,7 @@ from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.skin.atlas import HEAD
 from realizer.render.cameras import Camera, Framing, camera_for
 from realizer.render.light import presets
-from realizer.render.software import SoftwareCanvas
+from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
 from realizer.tracking.detector import detect
 from realizer.tracking.landmarks import landmarks

@@ -19,7 +19,7 @@ from realizer.face.load import MODEL, folder_of, load_face
 from realizer.face.model import Face
 from realizer.render.cameras import Camera, Framing, camera_for
 from realizer.render.light import Light, presets
-from realizer.render.software import SoftwareCanvas
+from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
 from realizer.tables.cooccurrence import rules
 from realizer.tracking.region import Region

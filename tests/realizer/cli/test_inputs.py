@@ -19,10 +19,7 @@ def test_opening_reports_all_but_a_full_disk_as_wrong_usage(number: int, kind: t
 
 
 def test_reporting_names_the_option_of_a_wrong_value() -> None:
-    with (
-        pytest.raises(click.BadParameter) as caught,
-        inputs.reporting(ValueError, wrong=inputs.bad("--plot")),
-    ):
+    with pytest.raises(click.BadParameter) as caught, inputs.reporting(OSError, wrong=inputs.bad("-o")):
         raise OSError("wanted a picture")
     assert caught.value.format_message() == "Invalid value for -o: wanted a picture"
 

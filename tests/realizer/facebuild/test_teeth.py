@@ -10,7 +10,7 @@ from realizer.face.surface import normals
 from realizer.facebuild.teeth import PALATE, RINGS, teeth
 from realizer.render.cameras import camera_for
 from realizer.render.light import preset
-from realizer.render.software import SoftwareCanvas
+from realizer.render.raster import SoftwareCanvas
 
 COLOURS = {"tooth": [240.0, 232, 214], "root": [228.0, 206, 180], "gum": [196.0, 112, 106]}
 WIDE = {3: 1100, 4: -80, 5: -1535, 10: -1245, 11: -1245, 52: -1525, 57: -1315, 58: -1315, 12: -480, 13: -480}

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import fap
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.offline import realize
-from realizer.outputs.morph_targets import TOLERANCE, make_morph_targets
+from realizer.outputs.morph_targets import TOLERANCE, make_arkit_targets, make_morph_targets
 
 pytestmark = pytest.mark.xdist_group("outputs")
 
@@ -86,3 +87,36 @@ def test_morph_targets_of_a_single_frame_are_exact(played):
     wanted = deform(face, still(face, poses))
     got = face.vertices + np.einsum("nk,kvc->nvc", made.weights, made.moves)
     assert np.linalg.norm(got - wanted, axis=2).max() < 1.2 * TOLERANCE
+
+
+@pytest.fixture(scope="module")
+def speaking(turn):
+    return realize(turn, voice="silent", fps=12.5)
+
+
+def test_make_arkit_targets_weighs_shapes_as_arkit_does(speaking):
+    made, frames = make_arkit_targets(speaking), arkit(speaking.aus, speaking.mapping)
+    assert made.names == ARKIT_NAMES()
+    assert np.array_equal(made.weights, frames.weights)
+    assert made.moves.shape == (52, *speaking.face.vertices.shape)
+    assert made.head == pytest.approx(frames.head[:, [1, 0, 2]])
+
+
+def test_make_arkit_targets_come_near_the_face(speaking):
+    made = make_arkit_targets(speaking)
+    still = speaking.poses.copy()
+    still[:, [k for k, name in enumerate(speaking.face.inputs) if name.startswith("head_")]] = 0
+    wanted = deform(speaking.face, still) - speaking.face.vertices
+    got = np.tensordot(made.weights, made.moves, 1)
+    skin = slice(*speaking.face.parts["skin"])
+    assert (
+        np.linalg.norm((got - wanted)[:, skin], axis=2).mean()
+        < 0.25 * np.linalg.norm(wanted[:, skin], axis=2).mean()
+    )
+
+
+def test_make_arkit_targets_leave_eyeballs_to_their_joints(speaking):
+    made = make_arkit_targets(speaking)
+    for name in ("left_eye", "right_eye"):
+        assert not made.moves[:, slice(*speaking.face.parts[name])].any()
+    assert np.abs(made.eyes).max() > 0.05

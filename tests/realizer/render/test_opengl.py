@@ -184,7 +184,7 @@ def mapped(balls):
 
 def differences(face, shape, camera, light, size=(512, 512)):
     """How far apart pictures by OpenGL and by the processor are where both are opaque, (n, 3) 0..255."""
-    from realizer.render.software import SoftwareCanvas
+    from realizer.render.raster import SoftwareCanvas
 
     pictures = []
     for kind in (OpenGLCanvas, SoftwareCanvas):

@@ -14,7 +14,7 @@ from realizer.face.load import load_face
 from realizer.facebuild.photo.views import read_views
 from realizer.render.cameras import Framing, camera_for
 from realizer.render.light import presets
-from realizer.render.software import SoftwareCanvas
+from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
 from tests.portraits import LITERT, portrait
 
