@@ -81,7 +81,7 @@ def batch(
         raise click.UsageError("--workers, --dask: wanted one of them, got both")
     strict: bool = flags.pop("strict")
     how = _options(formats, flags)
-    from realizer.batch.documents import DocumentsError, find
+    from realizer.batch.run import DocumentsError, find
     from realizer.batch.run import batch as run
 
     with inputs.reporting(DocumentsError):

@@ -12,8 +12,7 @@ from realizer.core.array_types import Float32, UInt8
 from realizer.core.errors import RenderError
 from realizer.face.model import Face
 from realizer.render.backdrop import background_of, channels
-from realizer.render.drawing_process import DRAW, DrawingProcess
-from realizer.render.process_messages import Open, Pixels
+from realizer.render.drawing_process import DRAW, DrawingProcess, Open, Pixels
 
 HALF = 8  # frames in half the shared memory: one half is drawn while the other is used
 HALF_BYTES = 32 << 20  # and at most this much of it

@@ -14,8 +14,8 @@ from realizer.face.model import Face, Fapu
 from realizer.render.backdrop import channels
 from realizer.render.cameras import Camera, camera_for
 from realizer.render.canvas import Canvas
+from realizer.render.drawing_process import Failed, Open, Pixels, connection
 from realizer.render.light import Light, preset
-from realizer.render.process_messages import Failed, Open, Pixels, connection
 
 BACKENDS = ("auto", "gl", "onboard")
 # Files that Linux shows where a graphics card may be used. Without one, OpenGL is drawn by the processor too,

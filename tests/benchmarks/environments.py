@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.render.environment import HEIGHT, LEVELS, WIDTH, polynomials
+from realizer.render.light import HEIGHT, LEVELS, WIDTH, polynomials
 
 TABLE = Path(__file__).parents[2] / "realizer/tables/environments.npz"
 FINE = 2  # texels of the source along each side of a texel of the table

@@ -232,9 +232,8 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
     from realizer.face.load import load_face
     from realizer.render.backdrop import is_picture
     from realizer.render.cameras import camera_for
-    from realizer.render.environment import HEIGHT
     from realizer.render.lamp_view import LampView
-    from realizer.render.light import preset, presets
+    from realizer.render.light import HEIGHT, preset, presets
     from realizer.render.uniforms import uniforms_of
 
     face = load_face(name)

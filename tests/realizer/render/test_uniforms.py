@@ -98,9 +98,9 @@ def by_card(rows, kind, light, lamp, depths):
 @pytest.mark.parametrize("name", presets())
 @pytest.mark.parametrize("kind", [SKIN, EYE, HAIR, WET, CLOTH])
 def test_surface_glsl_is_the_formula_of_the_processor(numbers, kind, name):
+    from realizer.render.lighting import reach
     from realizer.render.raster import lights_of
     from realizer.render.shading import reflected
-    from realizer.render.shadows import reach
     from realizer.render.surfaces import surfaces
 
     light = presets()[name]
