@@ -156,7 +156,6 @@ def languages_in(block: Block, words: Words) -> list[str]:
 
 
 def _count_placed(block: Block) -> int:
-    """Return the number of expressions that a rule has placed."""
     return sum(bool(getattr(node, "because", "")) for node in block.behaviours)
 
 

@@ -159,7 +159,6 @@ def _faps(played: Realization) -> list[str]:
 
 
 def _strongest(names: tuple[str, ...], values: Float64, fps: float, form: str) -> list[str]:
-    """Return the columns with the largest peaks, and when they have them."""
     peaks = np.abs(values).argmax(axis=0)
     lines = [
         f"{names[c]:<26} {form.format(values[peaks[c], c])} at {peaks[c] / fps:.2f} s"

@@ -120,7 +120,6 @@ class Realization(realization.Realization):
         yield _shown(lambda: f'<video controls src="{self._data(".mp4")}"></video>')
 
     def _data(self, suffix: str) -> str:
-        """Return the content of a file as an address."""
         from realizer.outputs.output import RenderSettings
         from realizer.outputs.registry import OUTPUTS
 
@@ -130,7 +129,6 @@ class Realization(realization.Realization):
 
 
 def _shown(part: Callable[[], str]) -> str:
-    """Return a part of the HTML, or why it is missing."""
     try:
         return part()
     except RealizerError as error:

@@ -121,7 +121,6 @@ class _WorkerProcess:
 
 
 def _serve(pipe: Connection[Any, Any], options: Options) -> None:
-    """Run tasks in a worker process until the pipe is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     worker = Worker(options)
     try:

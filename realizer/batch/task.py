@@ -94,7 +94,6 @@ def key_of(text: bytes, fingerprint: str) -> str:
 
 
 def _add(digest: hashlib._Hash, root: Path, files: Iterator[Path]) -> None:
-    """Add the relative names and the contents of files to a digest, in order."""
     for path in sorted(files):
         content = path.read_bytes()
         digest.update(f"{path.relative_to(root).as_posix()} {len(content)}\n".encode())

@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from realizer.charts.arrows import draw_links
+from realizer.charts.arrows import Arrows, Place
 from realizer.charts.diverging_scale import (
     FAINT,
     GRID,
@@ -112,6 +112,7 @@ GROUPS = {
     "mood": ("emotion", "expression", "mood", "idle", "listen"),
     "body": ("gesture", "pointing", "posture", "postureShift", "locomotion"),
 }  # fmt: skip
+Key = tuple[str, str]  # block, behaviour
 QUIET = ("IN_PREP", "LURKING", "IN_EXEC", "DONE")  # states that a chart need not name
 
 
@@ -121,12 +122,12 @@ def timeline(blocks: Sequence[BlockChart]) -> Picture:
     names = ", ".join(block.block for block in blocks)
     picture = Picture(scale.width, title=f"Timeline of {names or 'nothing'}", paper=PAPER)
     below, bars, above = (Picture(scale.width) for _ in range(3))
-    places: dict[tuple[str, str], tuple[BehaviourRow, float, float]] = {}
+    places: dict[Key, Place] = {}
     y = AXIS
     for block in blocks:
-        y = _block(picture, bars, scale, block, y, places) + APART
+        y = _block((picture, bars), scale, block, y, places) + APART
     for block in blocks:
-        draw_links(below, above, scale, block, places)
+        Arrows(below, above, scale, places).draw(block)
     bottom = y - APART + 4
     picture.shapes[:0] = _grid(scale, bottom)
     for layer in (below, bars, above):
@@ -135,14 +136,10 @@ def timeline(blocks: Sequence[BlockChart]) -> Picture:
 
 
 def _block(
-    picture: Picture,
-    bars: Picture,
-    scale: Scale,
-    block: BlockChart,
-    top: float,
-    places: dict[tuple[str, str], tuple[BehaviourRow, float, float]],
+    layers: tuple[Picture, Picture], scale: Scale, block: BlockChart, top: float, places: dict[Key, Place]
 ) -> float:
-    """Draw the ground and the rows of a block; returns where they end."""
+    """Draw the ground and the rows of a block into two layers; returns where they end."""
+    picture, bars = layers
     start = block.start or 0.0
     y = top + HEAD
     ground = len(picture.shapes)

@@ -150,7 +150,6 @@ def _names(
 
 
 def _shifts(width: float, k: int, count: int) -> Iterable[float]:
-    """Return possible offsets of a name from its tick: in the middle, to the right, to the left."""
     first = (-2.0, -width / 2) if k == 0 else (-width + 2, -width / 2) if k == count - 1 else (-width / 2,)
     return (*first, -2.0, -width + 2)
 

@@ -99,7 +99,6 @@ def _in_behaviour(builder: FindingBuilder, point: str, line: int) -> Spot:
 
 
 def _constraint(builder: FindingBuilder, id: str | None, line: int | None) -> Element | None:
-    """Return a constraint by its id, or the first one on a line."""
     found = builder.source.named(id, line=line) if id else None
     if found is None and not id and line is not None:
         on = (e for e in builder.source.on_line(line) if e.name.rpartition(":")[2] == "constraint")

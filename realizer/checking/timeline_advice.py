@@ -90,6 +90,5 @@ def _times(span: VisibleSpan, company: CompanionRule, usual: float) -> tuple[flo
 
 
 def _template(expression: Expression) -> str:
-    """Return the template of a built-in expression, or ""."""
     family, _, template = expression.name.rpartition(":")
     return template if family == "template" and expression.file is None else ""

@@ -64,7 +64,6 @@ def _film(documents: list[str], voice: str | None, face: str) -> None:
 
 
 def _next_steps(page: str | None) -> str:
-    """Return what the demo has made, and what to try next."""
     made = [f"{path}: {text}" for path, text in ((FILM, "the film"), (FRAMES, "its FAPs")) if path.is_file()]
     live = [f"{page}: the page, until Ctrl-C"] if page else []
     return "\n".join([*(f"made {line}" for line in made), *(f"open {line}" for line in live), NEXT])

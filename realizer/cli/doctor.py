@@ -150,7 +150,6 @@ def plugins(as_json: bool) -> None:
 
 @cache
 def _fix(extra: str) -> str | None:
-    """Return how to install an extra, or None if it works."""
     if extra == "render":
         from realizer.render.drawing_process import unavailable_reason
 

@@ -52,7 +52,6 @@ def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
 
 
 async def _serve(settings: Settings, copy: Path, browser: bool) -> None:
-    """Serve the page until the command is stopped."""
     import signal
     import webbrowser
 

@@ -141,7 +141,6 @@ def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_
 
 
 def _draw(expressions: Sequence[Expression], notes: Sequence[str], path: Path, face: str) -> None:
-    """Write a contact sheet of the expressions."""
     from PIL import Image
 
     from realizer.cli.sheet_poses import draw_expressions

@@ -187,7 +187,6 @@ def check(names: tuple[str, ...]) -> int:
 
 
 def _inspect_head(head: Path) -> tuple[str, ...]:
-    """Print what an import would find, or return why the head cannot be imported."""
     from realizer.core.errors import FaceError
     from realizer.facebuild.arkit.importer import inspect_head
 

@@ -216,7 +216,6 @@ def schedule(
 
 
 def _table(planned: Schedule) -> str:
-    """Return a line for the block and one for each behaviour."""
     if planned.failed:
         return f"{planned.block}  refused\n"
     lines = [f"{planned.block}  {planned.start:.3f} .. {planned.end:.3f} s"]

@@ -34,7 +34,6 @@ def study() -> None:
 
 
 def _key(value: Path | None, answers: Sequence[Path]) -> Path:
-    """Return the key that was named, or the only one beside the answers."""
     found = [value] if value else sorted({key for file in answers for key in file.parent.glob("*.key.json")})
     if len(found) != 1:
         raise click.UsageError(f"wanted --key DIR.key.json, got {len(found)} keys beside the answers")

@@ -83,7 +83,6 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
 
 
 def _from_points(source: str, output: Path, fps: float) -> Tracked:
-    """Return what feature points show, as a FAP file."""
     import numpy as np
 
     from realizer.analysis.faps_from_points import bridge, faps_from_points, read_points
@@ -102,7 +101,6 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
 
 
 def _from_markers(source: Path, output: Path, fps: float | None, look: Look, face: str) -> Tracked:
-    """Return what painted markers show."""
     from realizer.tracking.markers.film import FORMATS, faps_of
     from realizer.tracking.network import TrackingError
 

@@ -112,7 +112,6 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @cached_property
     def _warn(self) -> Callable[[str], None]:
-        """Log a warning, each text once."""
         return cache(log.warning)
 
     def _load(self, name: str) -> T:

@@ -44,7 +44,6 @@ def is_loopback(host: str) -> bool:
 
 
 def _closest(name: str, known: Iterable[str]) -> str | None:
-    """Return the setting with the most similar name, or None."""
     from difflib import get_close_matches
 
     return next(iter(get_close_matches(name, known, cutoff=0.8)), None)

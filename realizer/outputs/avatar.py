@@ -127,7 +127,6 @@ def _looks(name: str) -> bool:
 
 
 def _name(document: Mapping[str, Any], node: int) -> str:
-    """Return the names of a node and its mesh."""
     found = document["nodes"][node]
     return f"{found.get('name', '')} {document['meshes'][found['mesh']].get('name', '')}"
 

@@ -111,7 +111,6 @@ def _faces() -> tuple[tuple[str, ...], Float64]:
 
 
 def _skeleton() -> tuple[list[dict[str, Any]], dict[str, int]]:
-    """Return the nodes of the skeleton, and the node number of each bone."""
     bones = _table()["bones"]
     numbers = {name: k for k, name in enumerate(bones)}
     nodes: list[dict[str, Any]] = [{"name": name, "translation": bone["at"]} for name, bone in bones.items()]

@@ -195,7 +195,6 @@ def _mirror(gl: Any, levels: Float32) -> Any:
 
 
 def _give(program: Any, values: Mapping[str, Any], textures: Sequence[str]) -> None:
-    """Set the uniforms that a program uses, and the place of each texture."""
     for name in program:
         if name in textures:
             program[name].value = textures.index(name)

@@ -27,7 +27,7 @@ def dots(picture) -> list[Box]:
 
 
 @pytest.mark.parametrize("offset", ["", "+0.5", "-0.25"])
-def test_draw_links_curves_to_the_point_that_follows(lines, offset: str) -> None:
+def test_arrows_curves_to_the_point_that_follows(lines, offset: str) -> None:
     picture, scale, by_id = drawn(lines, TIED.format(f'stroke="w:end{offset}"', ""))
     (curve,) = paths(picture, LINK)
     stroke = next(p.time for p in by_id["n"].points if p.name == "stroke")
@@ -41,7 +41,7 @@ FIRST = """<bml id="b"><wait id="w" start="n:end" duration="1"/><head id="n" lex
 
 
 @pytest.mark.parametrize("document", [TIED.format('stroke="w:end"', ""), FIRST], ids=["down", "up"])
-def test_draw_links_ends_a_reference_in_an_arrow_of_its_curve(lines, document: str) -> None:
+def test_arrows_ends_a_reference_in_an_arrow_of_its_curve(lines, document: str) -> None:
     picture, _, _ = drawn(lines, document)
     (curve,) = paths(picture, LINK)
     begin, end = curve.points[0], curve.points[-1]
@@ -51,7 +51,7 @@ def test_draw_links_ends_a_reference_in_an_arrow_of_its_curve(lines, document: s
     assert [s.x + s.width / 2 for s in dots(picture)] == pytest.approx([begin[0]])
 
 
-def test_draw_links_ends_a_synchronize_in_dots(lines) -> None:
+def test_arrows_ends_a_synchronize_in_dots(lines) -> None:
     said = '<constraint><synchronize ref="w:end"><sync ref="n:stroke"/></synchronize></constraint>'
     picture, _, _ = drawn(lines, TIED.format("", said))
     (curve,) = paths(picture, LINK)
@@ -62,7 +62,7 @@ def test_draw_links_ends_a_synchronize_in_dots(lines) -> None:
     assert not [s for s in picture.shapes if isinstance(s, Path) and s.fill == LINK and s.points[0] in ends]
 
 
-def test_draw_links_writes_an_offset_beside_the_bar_it_belongs_to(lines) -> None:
+def test_arrows_writes_an_offset_beside_the_bar_it_belongs_to(lines) -> None:
     for sync in ("start", "end"):
         picture, _, _ = drawn(lines, TIED.format(f'{sync}="w:end+0.5"', ""))
         (curve,) = paths(picture, LINK)
@@ -70,13 +70,13 @@ def test_draw_links_writes_an_offset_beside_the_bar_it_belongs_to(lines) -> None
         assert (offset.x < curve.points[-1][0]) == (offset.anchor == "end") == (sync == "end"), sync
 
 
-def test_draw_links_draws_no_arrow_to_itself(lines) -> None:
+def test_arrows_draws_no_arrow_to_itself(lines) -> None:
     picture, _, _ = drawn(lines, '<bml id="b"><head id="n" lexeme="NOD" end="n:start+2"/></bml>')
     assert not paths(picture, LINK)
     assert not dots(picture)
 
 
-def test_draw_links_pins_a_point_at_a_time(lines) -> None:
+def test_arrows_pins_a_point_at_a_time(lines) -> None:
     picture, scale, _ = drawn(lines, TIED.format('start="0.5"', ""))
     tips = [s.points[0][0] for s in picture.shapes if isinstance(s, Path) and s.fill == HELD and s.tip]
     assert sorted(tips) == pytest.approx([scale.x(0.5), scale.x(1.0)])
@@ -89,7 +89,7 @@ def test_draw_links_pins_a_point_at_a_time(lines) -> None:
         ('<after ref="w:start"><sync ref="n:start"/></after>', 1.0),
     ],
 )
-def test_draw_links_hatches_the_slack(lines, said: str, bound: float) -> None:
+def test_arrows_hatches_the_slack(lines, said: str, bound: float) -> None:
     document = TIED.format('start="1.6"', f"<constraint>{said}</constraint>")
     picture, scale, _ = drawn(lines, document)
     (strip,) = [s for s in picture.shapes if isinstance(s, Box) and s.tip.endswith("s left")]
@@ -99,7 +99,7 @@ def test_draw_links_hatches_the_slack(lines, said: str, bound: float) -> None:
     assert paths(picture, ROOM)
 
 
-def test_draw_links_colours_an_order_that_binds(lines) -> None:
+def test_arrows_colours_an_order_that_binds(lines) -> None:
     said = '<constraint><after ref="w:end"><sync ref="n:start"/></after></constraint>'
     picture, _, _ = drawn(lines, TIED.format("", said))
     assert all(line.tip.endswith("binds") for line in paths(picture, TIGHT))
@@ -107,7 +107,7 @@ def test_draw_links_colours_an_order_that_binds(lines) -> None:
     assert not paths(picture, ROOM)
 
 
-def test_draw_links_names_a_block_outside_the_picture(lines) -> None:
+def test_arrows_names_a_block_outside_the_picture(lines) -> None:
     blocks = lines(
         '<bml id="a"><wait id="x" duration="1"/></bml>',
         '<bml id="b"><wait id="w" start="a:x:end" duration="1"/></bml>',
