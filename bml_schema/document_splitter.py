@@ -127,10 +127,9 @@ def document_spans(text: str, first: int = 0, last: int | None = None) -> Iterat
             continue
         end = ends.get(n) or next_starts.get(n, last)
         if mark.kind == "end":
-            if doctype >= 0:
-                yield DocumentSpan(doctype, offset, fault=_NO_DTD)
-            elif junk >= 0:
-                yield DocumentSpan(junk, offset, fault=_not_bml(text[junk:offset]))
+            begin = doctype if doctype >= 0 else junk
+            if begin >= 0:  # nothing but the broken stretch, such as a page of HTML
+                yield DocumentSpan(begin, offset, fault=_not_bml(text[begin:offset]))
         elif doctype >= 0:
             yield DocumentSpan(doctype, end, text[mark.start : mark.end], _NO_DTD)
         else:

@@ -31,9 +31,14 @@ class Document(NamedTuple):
 
 
 def is_file_name(text: str) -> bool:
-    """Return whether a text names a file: it ends in a suffix that we read, or holds a path separator."""
+    """Return whether a text names a file: by its suffix, a path separator, or because it exists.
+
+    Without a separator, a file needs a suffix and under 64 characters: other words are spoken.
+    """
     named = text.lower().endswith(SUFFIXES) or any(s in text for s in (os.sep, os.altsep) if s)
-    return "<" not in text and named
+    return "<" not in text and (
+        named or (len(text) < 64 and bool(Path(text).suffix) and Path(text).is_file())
+    )
 
 
 def documents_of(source: Source | Iterable[Source]) -> list[Document]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import re
 import time
@@ -21,6 +22,7 @@ from realizer.protocol.wire import WireFrame, unpack
 # Lengths of the queues for iterators slower than the service; older messages are dropped.
 MAX_FRAMES = 1_000
 MAX_FEEDBACK = 10_000
+_LOG = logging.getLogger("realizer.client")
 _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
@@ -117,6 +119,8 @@ class Router:
         else:
             feedback = parse_feedback(message)
             self.feedback.append(feedback)
+            if isinstance(feedback, WarningFeedback):
+                _LOG.warning("%s: %s: %s", feedback.id, feedback.type, feedback.text)
             for listener in self._listeners:
                 listener.on_feedback(feedback)
             self._listeners = [listener for listener in self._listeners if not listener.is_finished]

@@ -377,3 +377,9 @@ def test_read_gives_the_same_for_one_document_and_for_one_among_others(block: Bl
     assert isinstance(alone, Block)
     assert isinstance(among, Block)
     assert (alone, alone.places) == (among, among.places)
+
+
+def test_read_a_page_of_html_says_what_came_instead_of_bml() -> None:
+    (error,) = read("<!DOCTYPE html>\n<html><body>Hello</body></html>")
+    assert isinstance(error, BMLError)
+    assert error.text == 'wanted <bml>, got "<!DOCTYPE html>\n<html><body>Hello</body></html>"'

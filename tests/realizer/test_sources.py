@@ -27,6 +27,15 @@ def test_is_file_name_of_a_suffix_or_a_path(text: str, is_file: bool) -> None:
     assert not is_file_name(f"<bml id='{text}'/>")
 
 
+def test_is_file_name_of_a_file_with_any_suffix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert not is_file_name("page.html")
+    for name in ("page.html", "Hello"):
+        (tmp_path / name).write_text("<html/>")
+    assert is_file_name("page.html")
+    assert not is_file_name("Hello")
+
+
 @pytest.mark.parametrize("source", ["Tom & Jerry, 1 > 0?", b"Tom & Jerry, 1 > 0?"])
 def test_documents_of_a_text_speak_it(source: str | bytes) -> None:
     (document,) = documents_of(source)

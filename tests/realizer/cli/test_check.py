@@ -55,6 +55,13 @@ def test_check_of_a_document_without_faults_prints_nothing(tmp_path: Path) -> No
     assert "no fault in 1 block" in done.stderr
 
 
+@pytest.mark.parametrize("text", ["", " \n", "<!-- later -->"])
+def test_check_of_nothing_is_a_fault(tmp_path: Path, text: str) -> None:
+    done = check(tmp_path, text)
+    assert done.return_value == 1
+    assert "wanted <bml>, or a text to speak, got nothing" in done.stdout
+
+
 CASES = {
     "value": ('<head id="n" lexeme="NOD" amount="7"/>', ["7"], "without it, amount is 0.5"),
     "id": ('<head id="nod" lexeme="NOD"/><wait id="w" start="nodd:end"/>', ["nodd"], 'mean "nod"?'),

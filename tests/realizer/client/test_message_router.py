@@ -34,6 +34,13 @@ def test_router_matches_an_answer_to_its_request(mail) -> None:
     assert [one["where"] for one in mail.errors] == ["set.aus", "video"]
 
 
+def test_router_logs_what_was_dropped(mail, caplog) -> None:
+    mail.receive(WarningFeedback(id="b:n", type="CANNOT_CREATE_BEHAVIOR", text="no such lexeme").to_xml())
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("realizer.client", "WARNING")
+    assert record.getMessage() == "b:n: CANNOT_CREATE_BEHAVIOR: no such lexeme"
+
+
 @pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
 def test_router_raises_the_error_of_a_request(mail, where) -> None:
     mail.expect_answer("subscribe")
