@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from bml_schema import Block, read, write
 from bml_schema.dialects.table import Row, table
 from realizer.pipeline import plan
@@ -24,6 +26,7 @@ def test_rows_become_what_their_file_says() -> None:
     assert ROWS.read_text("utf-8") == cases(), "run: python -m tests.dialects, and review the changes"
 
 
+@pytest.mark.slow
 @each_row("row", table().rows)
 def test_rows_play_alike_live_and_offline_and_as_bml_1_0(row: Row) -> None:
     voice, document = SilentVoice(), sample(row)

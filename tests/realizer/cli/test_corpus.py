@@ -27,6 +27,7 @@ def track(*args: object) -> Result:
     return CliRunner().invoke(cli, ["corpus", "track", *map(str, args)], standalone_mode=False)
 
 
+@pytest.mark.slow
 def test_corpus_goes_from_recordings_to_rules(tmp_path: Path) -> None:
     folder, part = tmp_path / "films", tmp_path / "part"
     write_recording(part, acted(1))

@@ -110,6 +110,7 @@ def deepest(shape: Float64, flesh: Int32, walls: list[Int32]) -> float:
     return float(np.where(depth > SIDE * away[near], depth, 0).max(initial=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FACES)
 def test_tongue_room_keeps_the_tongue_out_of_teeth_and_lips(name: str) -> None:
     face = load_face(name)

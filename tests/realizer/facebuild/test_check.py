@@ -267,6 +267,7 @@ def test_check_command_does_not_advise_to_check(folder: Path) -> None:
     assert not any("run realizer faces check" in fault for fault in faults(folder))
 
 
+@pytest.mark.slow
 def test_list_faces_leaves_out_damaged_faces_alone(folder: Path) -> None:
     (folder / "face.toml").write_text("name = 3\n")
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)})
@@ -288,6 +289,7 @@ def test_check_command_takes_the_path_of_an_import(folder: Path) -> None:
         load_face(str(folder))
 
 
+@pytest.mark.slow
 def test_check_command_without_a_name_checks_every_face(folder: Path) -> None:
     (folder / "mesh.npz").unlink()
     ran = CliRunner(env={"REALIZER_FACES": str(folder.parent)}).invoke(

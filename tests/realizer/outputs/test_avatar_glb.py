@@ -111,6 +111,7 @@ def test_avatar_keeps_its_own_animations_and_resting_weights(played, shown, tmp_
     assert set(weights_in(tmp_path / "x.glb", 2)[:, 1]) == {0.25}
 
 
+@pytest.mark.slow
 def test_avatar_made_of_our_own_face_is_valid(turn, tmp_path, read_by):
     played = realize(turn, voice="silent", fps=2)
     played.save(tmp_path / "mine.glb", morphs="arkit")

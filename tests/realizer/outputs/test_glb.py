@@ -62,6 +62,7 @@ def mean(got, wanted):
     return np.mean([np.linalg.norm(np.asarray(got[name]) - wanted[name], axis=1).mean() for name in wanted])
 
 
+@pytest.mark.slow
 def test_glb_is_valid_and_looks_like_the_face_in_three_js(played, path, read_by):
     frames = [0, 12, played.frames - 1]
     seen = read_by("gltf.mjs", path, *(str(k / FPS) for k in frames))
@@ -143,6 +144,7 @@ def test_glb_of_a_face_at_rest_has_no_targets(tmp_path, read_by):
     assert far(seen["frames"][0], split(face, face.vertices)) < 1e-6
 
 
+@pytest.mark.slow
 def test_glb_is_deterministic(played, path):
     made = make_morph_targets(played.face, played.poses)
     assert encode_glb(played.face, made, FPS) == path.read_bytes()

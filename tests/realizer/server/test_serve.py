@@ -21,7 +21,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from bml_schema.feedback import BlockProgress, SyncPointProgress, parse_feedback
 from realizer.core.settings import Settings, SettingsError
 from realizer.protocol.wire import unpack
-from realizer.server.serve import Server, wait_for_signal, serve, work
+from realizer.server.serve import Server, serve, wait_for_signal, work
 from realizer.server.session.session import Session
 from tests.programs import SERVE, running
 

@@ -104,6 +104,7 @@ def test_make_atlas_repeats_textures_as_the_sampler_says(wrap: int, wanted: int)
     assert seen(atlas, "albedo", 0)[:3] == pytest.approx(colours[wanted], abs=8)
 
 
+@pytest.mark.slow
 def test_make_atlas_shrinks_what_is_larger_than_it() -> None:
     wide = flat(40, 80, 120, size=(3000, 3000))
     many = [material(base=0) for _ in range(3)]

@@ -40,6 +40,7 @@ def seen(at: np.ndarray, view: str, pose: Pose) -> np.ndarray:
     return points
 
 
+@pytest.mark.slow
 def test_fit_finds_poses_and_places_again(data: Path) -> None:
     _, at = person(data)
     poses = [

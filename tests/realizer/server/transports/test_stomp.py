@@ -475,6 +475,7 @@ def test_stomp_joins_once_although_another_process_has_its_session(tmp_path: Pat
     alone(test, journal=where)
 
 
+@pytest.mark.slow
 def test_stomp_begins_a_new_session_after_one_that_fails(caplog) -> None:
     async def test(server: Server) -> None:
         link = transport_of(server)._links[0]

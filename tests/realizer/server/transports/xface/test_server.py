@@ -478,6 +478,7 @@ def test_xface_loads_a_million_bytes_of_frames() -> None:
     serving(test)
 
 
+@pytest.mark.slow
 def test_xface_accepts_a_thousand_connections_one_after_the_other() -> None:
     async def test(server: Server, transport: XfaceTransport) -> None:
         async with Client(transport.port) as other:
