@@ -11,7 +11,7 @@ from realizer.animation.fap.conversion import FapMapping, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
-from realizer.tables import faps, read_csv, text_of
+from realizer.tables import csv_rows, faps
 from realizer.tables.arkit_names import shapes
 
 # Approximate millimetres a unit on an adult face; for angles, on an eyeball with a radius of 12 mm.
@@ -171,7 +171,7 @@ def shape_faps(mapping: FapMapping | None) -> Float32:
     for k, name in enumerate(names):
         if shapes()[name].side:
             effects[k] *= _side_share(shapes()[name].side)
-    for slide in read_csv(text_of("arkit_slides.csv"), _Slide, "arkit_slides.csv"):
+    for slide in csv_rows("arkit_slides.csv", _Slide):
         effects[names.index(slide.name), slide.fap - 1] = slide.value
     lips = -effects[names.index(OPEN)]
     lips[[fap - 1 for fap in JAW]] = 0

@@ -70,7 +70,8 @@ def check_file(node: FapFile, context: PlanningContext) -> tuple[Fault, ...]:
         return faults
     clip = media.load(node.file_name, context, read)
     words = [note for note in clip.notes if note.startswith(("FAP 1:", "FAP 2:"))]
-    far = [number for number in moved(clip) if out_of_range(number, *_extremes(clip, number))]
+    least, most = clip.values.min(axis=0).tolist(), clip.values.max(axis=0).tolist()
+    far = [n for n in moved(clip) if out_of_range(n, least[n - 1], most[n - 1])]
     if far:
         words.append(f"FAP {', '.join(map(str, far))} beyond the range of the standard are limited to it")
     text = f"fileName: {node.file_name}: {'; '.join(words)}"
@@ -115,11 +116,6 @@ def out_of_range(number: int, least: float, most: float) -> tuple[Fault, ...]:
     got = most if most > row.most else least
     text = f"FAP {number} ({row.name}): wanted {row.least:g}..{row.most:g}, got {got:g}; limited to it"
     return (Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", text, fatal=False),)
-
-
-def _extremes(clip: FAPClip, number: int) -> tuple[float, float]:
-    values = clip.values[:, number - 1]
-    return float(values.min()), float(values.max())
 
 
 KINDS = (

@@ -27,7 +27,7 @@ class FapExpression:
 @cache
 def fap_expressions() -> tuple[FapExpression, ...]:
     """Return all expressions but 0, which is none."""
-    return tables.read_csv(tables.text_of("fap_expressions.csv"), FapExpression, "fap_expressions.csv")
+    return tables.csv_rows("fap_expressions.csv", FapExpression)
 
 
 def expand_compound(clip: FAPClip) -> FAPClip:

@@ -6,8 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Sequence
-from functools import cache
-from typing import Any
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.kind import Fault, PlanningContext, Position
 from realizer.core.array_types import Float64
 
-FILE = "gaze.toml"
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))
 _SEPARATORS = re.compile(r"[\s_-]")
@@ -28,9 +26,7 @@ Turn = tuple[float, float]
 TURNS = {"eyes": ((61, 62), (63, 64)), "head": ((51, 52), (53, 54))}
 
 
-@cache
-def facts() -> dict[str, Any]:
-    return tables.read_toml(tables.text_of(FILE), FILE)
+facts = partial(tables.toml_table, "gaze.toml")
 
 
 def limits(part: str) -> Turn:

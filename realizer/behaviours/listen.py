@@ -41,7 +41,9 @@ def expand(
         movements = 1 + min(int(np.searchsorted(counts, count)), len(counts) - 1)
         channels += respond(name, begin, size, node.id, context, movements=movements)
     shown = tuple(channel for channel in channels if channel.times[-1] <= end)
-    return (_eyes(start, end, node.id), *shown) if node.intensity > 0.0 else shown
+    # With this mask the eyes stay with the speaker.
+    eyes = OnsetMask(mask_channel("listening"), times, np.ones(2), layer=Layer.BASE, source=node.id)
+    return (eyes, *shown) if node.intensity > 0.0 else shown
 
 
 def respond(
@@ -63,12 +65,6 @@ def respond(
         Channel(au(n)[0], keys, degrees / tables.by_number()[n].degrees, layer=Layer.HEAD, source=source)
         for n in (DOWN, EYES_UP)
     )
-
-
-def _eyes(start: float, end: float, source: str) -> Channel:
-    """Return the mask with which the eyes stay with the speaker, from start to end."""
-    times, held = np.array([start, end]), np.ones(2)
-    return OnsetMask(mask_channel("listening"), times, held, layer=Layer.BASE, source=source)
 
 
 def _responses(

@@ -52,10 +52,6 @@ def guarded(kind: BehaviourKind, plugin: str) -> BehaviourKind:
     return replace(kind, check=check, expand=expand)
 
 
-def _is_family(value: Any) -> bool:
-    return isinstance(value, tuple) and all(isinstance(kind, BehaviourKind) for kind in value)
-
-
 # Family, a module of this package -> its elements. It is imported when one of them is first used, or at once
 # if their node classes are not in bml_schema.
 ELEMENTS = {
@@ -76,7 +72,7 @@ FAMILIES: Registry[tuple[BehaviourKind, ...]] = Registry(
     "realizer.behaviours",
     {name: f"realizer.behaviours.{name}:KINDS" for name in ELEMENTS},
     wanted="a tuple of realizer.behaviours.kind.BehaviourKind",
-    accepts=_is_family,
+    accepts=lambda v: isinstance(v, tuple) and all(isinstance(kind, BehaviourKind) for kind in v),
 )
 
 

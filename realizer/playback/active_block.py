@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
@@ -256,7 +256,8 @@ class ActiveBlock:
                 )
             elif new:
                 old = self.channels.get(behaviour, ())
-                self.channels[behaviour] = crossfade(old, new, now) if begun or _moves(old, now) else new
+                moves = begun or any(channel.span[0] < now for channel in old)
+                self.channels[behaviour] = crossfade(old, new, now) if moves else new
             if not begun:
                 self.known_since[behaviour] = now
             if behaviour in self.speech and not begun:
@@ -370,7 +371,3 @@ class ActiveBlock:
             since = self.known_since[behaviour]
             for channel in channels:
                 yield KnownMotion(since if channel.crossfade is None else channel.crossfade.at, channel)
-
-
-def _moves(channels: Iterable[Channel], now: float) -> bool:
-    return any(channel.span[0] < now for channel in channels)

@@ -82,27 +82,22 @@ class BlockTimeline:
             for look in (self.blocks.schedule_of, self.blocks.first_schedule_of)
         )
         existing = self._existing_claims(character, arrival.number if starts else 0, alive, now)
-        planned = plan_block(
-            block,
-            self.kinds,
-            arrival.context,
-            start=origin,
-            external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
-            existing_claims=existing if start <= now else (),
-            others=[member(p, origin, now) for p in others],
-            may_stretch=may_stretch,
-        )
-        if planned.other_schedules and self._conflict(others, planned.other_schedules):
-            return self.plan(
-                arrival,
-                start,
-                now,
-                waits=waits,
-                ended=ended,
-                alone=True,
-                starts=starts,
+
+        def plan(others: Sequence[ActiveBlock]) -> Plan:
+            return plan_block(
+                block,
+                self.kinds,
+                arrival.context,
+                start=origin,
+                external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
+                existing_claims=existing if start <= now else (),
+                others=[member(p, origin, now) for p in others],
                 may_stretch=may_stretch,
             )
+
+        planned = plan(others)
+        if planned.other_schedules and self._conflict(others, planned.other_schedules):
+            return plan([]), []
         return planned, others
 
     def _existing_claims(

@@ -168,8 +168,7 @@ class Schedule:
     @property
     def behaviours(self) -> dict[str, dict[str, float]]:
         """{behaviour id: {sync point: seconds from block start}}."""
-        spans = work.counted(self.times.items())
-        return {b: dict(zip(self.points[b], times.tolist(), strict=True)) for b, times in spans}
+        return {b: self[b] for b in work.counted(self.times)}
 
     @property
     def dropped(self) -> tuple[str, ...]:
@@ -197,7 +196,7 @@ class Schedule:
         return float(self.times[behaviour][self.points[behaviour].index(sync)])
 
     def __getitem__(self, behaviour: str) -> dict[str, float]:
-        return {p: float(t) for p, t in zip(self.points[behaviour], self.times[behaviour], strict=True)}
+        return dict(zip(self.points[behaviour], self.times[behaviour].tolist(), strict=True))
 
     def to_json(self) -> dict[str, Any]:
         """Return the JSON of `realizer schedule --json`."""

@@ -94,7 +94,7 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
 
 
 def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
-    pressure = coarticulation()["pressure"]
+    pressure, loudness = coarticulation()["pressure"], coarticulation()["loudness"]
     rows: list[_Row] = []
     for phoneme in phonemes:
         parts = sounds(phoneme.ipa)
@@ -109,7 +109,9 @@ def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
         for part in parts:
             until = at + part.share * length
             if part.vowel:
-                size, effort = _size(phoneme, until - at), _effort(phoneme)
+                # A vowel opens further because it is loud.
+                effort = max(max(phoneme.volume, 0.0) ** loudness["exponent"], loudness["least"])
+                size, effort = _size(phoneme, until - at), float(min(effort, loudness["most"]))
                 rows.append(_Row(at, until, part.mix, part.shape, True, size, effort))
             else:
                 rows.append(_Row(at, until, part.mix, part.shape, pressure=firm))
@@ -147,12 +149,6 @@ def _size(phoneme: Phoneme, length: float) -> float:
     short = coarticulation()["undershoot"]
     stress = coarticulation()["stress"][STRESS.get(phoneme.stress, "none")]
     return float(stress * (1 - short["lost"] * math.exp(-length / short["decay"])))
-
-
-def _effort(phoneme: Phoneme) -> float:
-    """Return the factor by which a vowel opens further because it is loud."""
-    facts = coarticulation()["loudness"]
-    return float(min(max(max(phoneme.volume, 0.0) ** facts["exponent"], facts["least"]), facts["most"]))
 
 
 def key_times(phonemes: Sequence[Phoneme], lead: float = 0.0) -> Float64:

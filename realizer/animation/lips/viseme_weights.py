@@ -27,7 +27,7 @@ class OculusViseme:
 @cache
 def oculus_visemes() -> tuple[OculusViseme, ...]:
     """Return the 15 Oculus visemes in the order of their numbers."""
-    return tables.read_csv(tables.text_of("visemes_oculus.csv"), OculusViseme, "visemes_oculus.csv")
+    return tables.csv_rows("visemes_oculus.csv", OculusViseme)
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:

@@ -3,8 +3,9 @@
 import math
 import unicodedata
 from dataclasses import dataclass, fields
-from functools import cache, lru_cache
-from typing import Any, TypeAlias
+from functools import cache, lru_cache, partial
+from itertools import chain
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,19 +16,6 @@ from realizer.tables.phonemes import PhonemeFeatures, phoneme_features
 VISEME_COUNT = 15  # 0 none, 1..14: ISO/IEC 14496-2
 ROUNDED = 14  # the viseme of a rounded mouth
 BILABIAL = 1
-SHAPE_COLUMNS = (
-    "jaw",
-    "upper",
-    "lower",
-    "push_upper",
-    "push_lower",
-    "width",
-    "corner",
-    "tip",
-    "thrust",
-    "body",
-    "roll",
-)
 # Articulators that move on their own, and their columns.
 ARTICULATORS = {
     "jaw": ("jaw",),
@@ -37,6 +25,7 @@ ARTICULATORS = {
     "tip": ("tip", "thrust"),
     "body": ("body", "roll"),
 }
+SHAPE_COLUMNS = tuple(chain.from_iterable(ARTICULATORS.values()))
 PAUSE = "pause"  # example of the parted lips of a pause
 Mix: TypeAlias = tuple[tuple[int, float], ...]
 
@@ -88,7 +77,7 @@ class Articulation:
 @cache
 def lip_shapes() -> tuple[LipShape, ...]:
     """Return the 15 mouth shapes of visemes, index = viseme, then those of sounds that differ from them."""
-    return tables.read_csv(tables.text_of("visemes.csv"), LipShape, "visemes.csv")
+    return tables.csv_rows("visemes.csv", LipShape)
 
 
 @cache
@@ -98,10 +87,8 @@ def own_shapes() -> dict[str, int]:
     return {ipa: number for number, row in rows for ipa in row.example.split()}
 
 
-@cache
-def coarticulation() -> dict[str, Any]:
-    """Return the constants of the dominance model; the file states their sources."""
-    return tables.read_toml(tables.text_of("coarticulation.toml"), "coarticulation.toml")
+# The constants of the dominance model; the file states their sources.
+coarticulation = partial(tables.toml_table, "coarticulation.toml")
 
 
 @cache
@@ -175,7 +162,7 @@ def _vowel_mix(row: PhonemeFeatures) -> Mix:
 
 @cache
 def _viseme_of(place: str, manner: str) -> int:
-    rules = tables.read_csv(tables.text_of("phonemes_visemes.csv"), VisemeRule, "phonemes_visemes.csv")
+    rules = tables.csv_rows("phonemes_visemes.csv", VisemeRule)
     for rule in rules:
         if rule.place in (place, "any") and rule.manner in (manner, "any"):
             return rule.viseme
