@@ -11,6 +11,7 @@ from realizer.core.errors import VoiceError
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech.duration_fit import silent_fallback, speak_to_length, stretched
+from realizer.speech.registry import find_voice
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
 
@@ -73,19 +74,13 @@ class _NamedVoice:
 
     def __init__(self, name: str | None) -> None:
         self.name = name or "default"
-        self._voice = None if name is None else self._find(name)
+        self._voice = None if name is None else find_voice(name)
 
     def say(self, request: SpeechRequest) -> Utterance:
         if self._voice is None:
-            self._voice = self._find(None)
+            self._voice = find_voice()
         return self._voice.say(request)
 
     def close(self) -> None:
         if self._voice is not None:
             self._voice.close()
-
-    @staticmethod
-    def _find(name: str | None) -> Voice:
-        from realizer.speech.registry import find_voice
-
-        return find_voice(name)

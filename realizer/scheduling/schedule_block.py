@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,41 +14,13 @@ from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import TIGHT
 from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
-from realizer.scheduling.timing import Schedule, Timing, Warning
+from realizer.scheduling.timing import Schedule, Warning
 
 if TYPE_CHECKING:
-    from bml_schema import Block, SyncRef
+    from bml_schema import SyncRef
 
 # Behaviours may begin so much earlier where it is asked how late they are.
 LONG_AGO = 1e6  # s
-
-
-def schedule_block(
-    block: Block,
-    timings: Mapping[str, Timing],
-    *,
-    earliest: float = 0.0,
-    outside: Callable[[SyncRef], float | None] = lambda ref: None,
-    priorities: Mapping[str, float] | None = None,
-) -> Schedule:
-    """Return the sync times of a block: constraints hold, gaps are as near as possible to their preference.
-
-    Free behaviours start as early as they can. In a conflict, an optional constraint is dropped, or else the
-    behaviour of the lowest priority that is not required (of equals the later one), with one warning each.
-
-    Args:
-        timings: behaviour id -> preferred timing. A behaviour without one counts as absent, and references to
-            it are ignored.
-        earliest: the earliest start of any behaviour, seconds from block start.
-        outside: a reference into another block, with its offset -> seconds from this block's start; None if
-            it is unknown, which drops the referring part.
-        priorities: behaviour id -> priority, 0 if absent.
-
-    Returns:
-        The schedule; `failed`, without times, if required parts are in conflict.
-    """
-    member = Member(block, timings, earliest=earliest, priorities=priorities or {})
-    return schedule_together([member], outside=outside)[0]
 
 
 def schedule_together(
@@ -59,6 +31,10 @@ def schedule_together(
 ) -> list[Schedule]:
     """Return the sync times of a new block and of playing blocks, solved together, each from its own start.
 
+    Constraints hold, gaps are as near as possible to their preference, free behaviours start as early as they
+    can. In a conflict, an optional constraint is dropped, or else the behaviour of the lowest priority that
+    is not required (of equals the later one), with one warning each.
+
     Behaviours that would have to start before their block, because a point of another block that they refer
     to has just passed, start as soon as they can and keep their lengths, if that is within `grace`. If not,
     they are late by `grace` and shorter, or dropped if that is not enough. If the new block fails, only its
@@ -66,7 +42,8 @@ def schedule_together(
 
     Args:
         members: the new block first; past points of the others are fixed, all else may move.
-        outside: a reference into a block that is no member -> seconds on the members' clock.
+        outside: a reference into a block that is no member, with its offset -> seconds on the members' clock;
+            None if it is unknown, which drops the referring part.
     """
     new = members[0].block
     problem = problem_of(members, outside)

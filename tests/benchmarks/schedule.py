@@ -35,7 +35,8 @@ from stopwatch import handle_help, noise
 from bml_schema import MAX_BEHAVIOURS, Block, parse
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
-from realizer.scheduling import Timing, schedule_block
+from realizer.scheduling import Timing
+from tests.realizer.scheduling.recipes import schedule_block
 
 Work = tuple[Block, dict[str, Timing]]
 

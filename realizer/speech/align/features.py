@@ -8,10 +8,10 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.speech.align.alignment import AlignError
+from realizer.speech.sound_visemes.mel_stream import RATE as RATE
+from realizer.speech.sound_visemes.mel_stream import SPECTRUM, WINDOW, mel_triangles
 from realizer.speech.utterance import RATES
 
-RATE = 16_000  # Hz; speech has all relevant frequencies below half of it
-WINDOW, SPECTRUM = 400, 512  # samples: 25 ms, as usual in speech recognition
 BANDS, LOWEST, HIGHEST = 26, 100.0, 7000.0  # of the mel scale, Hz
 KEPT = 13  # cepstra; higher ones depend on the pitch
 EMPHASIS = 0.97
@@ -46,9 +46,9 @@ def energies(sound: Float32, hop: float) -> Float64:
     at = np.rint(np.arange(int(len(sound) / hop) + 1) * hop).astype(np.intp)
     padded = np.pad(flat, (WINDOW // 2, WINDOW))
     frames = np.lib.stride_tricks.sliding_window_view(padded, WINDOW)
-    shape = np.hamming(WINDOW).astype(np.float32)
+    shape, bands = np.hamming(WINDOW).astype(np.float32), mel_triangles(BANDS, LOWEST, HIGHEST)
     parts = [
-        np.abs(np.fft.rfft(frames[at[k : k + AT_ONCE]] * shape, SPECTRUM)) ** 2 @ _bands()
+        np.abs(np.fft.rfft(frames[at[k : k + AT_ONCE]] * shape, SPECTRUM)) ** 2 @ bands
         for k in range(0, len(at), AT_ONCE)
     ]
     return np.concatenate(parts)
@@ -90,17 +90,6 @@ def _slopes(values: Float64) -> Float64:
     steps = range(1, SLOPE + 1)
     rise = sum(k * (padded[SLOPE + k :][:count] - padded[SLOPE - k :][:count]) for k in steps)
     return np.asarray(rise / (2.0 * sum(k * k for k in steps)), np.float64)
-
-
-@cache
-def _bands() -> Float64:
-    """(spectrum / 2 + 1, bands): triangles, evenly spread on the mel scale."""
-    low, high = (1127 * np.log1p(edge / 700) for edge in (LOWEST, HIGHEST))
-    edges = 700 * np.expm1(np.linspace(low, high, BANDS + 2) / 1127)
-    places = np.fft.rfftfreq(SPECTRUM, 1 / RATE)[:, None]
-    rise = (places - edges[:-2]) / np.diff(edges[:-1])
-    fall = (edges[2:] - places) / np.diff(edges[1:])
-    return np.asarray(np.maximum(0.0, np.minimum(rise, fall)), np.float64)
 
 
 @cache

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from realizer import tables
-from realizer.core.array_types import Float32, Int16
+from realizer.core.array_types import Float32, Float64, Int16
 
-RATE = 16_000  # Hz
+RATE = 16_000  # Hz; speech has all relevant frequencies below half of it
 HOP, WINDOW, SPECTRUM = 160, 400, 512  # samples: 10 ms, 25 ms
 SHAPE = np.hanning(WINDOW).astype(np.float32)
 BLOCK = 2  # frames that are computed at once
@@ -98,13 +98,19 @@ def _log_mel(sound: Float32, blocks: int) -> Float32:
 
 @lru_cache(1)
 def _bands() -> Float32:
-    """Return (spectrum / 2 + 1, BANDS) triangles, even on the mel scale, so that full scale is 1."""
-    low, high = (1127 * np.log1p(edge / 700) for edge in (LOWEST, HIGHEST))
-    edges = 700 * np.expm1(np.linspace(low, high, BANDS + 2) / 1127)
+    """Return (spectrum / 2 + 1, BANDS) triangles, so that full scale is 1."""
+    return np.asarray(mel_triangles(BANDS, LOWEST, HIGHEST) / (WINDOW / 4) ** 2, np.float32)
+
+
+@lru_cache(2)
+def mel_triangles(bands: int, lowest: float, highest: float) -> Float64:
+    """Return (SPECTRUM / 2 + 1, bands) triangles, evenly spread on the mel scale; frequencies in Hz."""
+    low, high = (1127 * np.log1p(edge / 700) for edge in (lowest, highest))
+    edges = 700 * np.expm1(np.linspace(low, high, bands + 2) / 1127)
     places = np.fft.rfftfreq(SPECTRUM, 1 / RATE)[:, None]
     rise = (places - edges[:-2]) / np.diff(edges[:-1])
     fall = (edges[2:] - places) / np.diff(edges[1:])
-    return np.asarray(np.maximum(0.0, np.minimum(rise, fall)) / (WINDOW / 4) ** 2, np.float32)
+    return np.asarray(np.maximum(0.0, np.minimum(rise, fall)), np.float64)
 
 
 def _taps(rate: int) -> int:

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from hypothesis import strategies as st
 
-from bml_schema import parse
+from bml_schema import Block, parse
 from realizer.core.array_types import Float64
-from realizer.scheduling import Schedule, schedule_block
+from realizer.scheduling import Member, Schedule, Timing, schedule_together
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
-from realizer.scheduling.timing import Timing
 
 # (behaviour, point), modulo their numbers.
 Spot = tuple[int, int]
+
+
+def schedule_block(
+    block: Block, timings: Mapping[str, Timing], *, outside: Any = lambda ref: None, **fields: Any
+) -> Schedule:
+    """Return the schedule of a block on its own."""
+    return schedule_together([Member(block, timings, **fields)], outside=outside)[0]
 
 
 class Body(NamedTuple):

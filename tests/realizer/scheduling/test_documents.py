@@ -12,7 +12,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from bml_schema import parse
-from realizer.scheduling import Schedule, Timing, schedule_block
+from realizer.scheduling import Schedule, Timing
+from tests.realizer.scheduling.recipes import schedule_block
 
 WAITS = 6
 

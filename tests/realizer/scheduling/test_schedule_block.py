@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bml_schema import parse
-from realizer.scheduling import Schedule, Timing, schedule_block
+from realizer.scheduling import Schedule, Timing
+from tests.realizer.scheduling.recipes import schedule_block
 
 FACE = ("start", "attackPeak", "relax", "end")
 NOD = ("start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end")

@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, parse
-from realizer.scheduling import Member, Schedule, Timing, schedule_block, schedule_together
+from realizer.scheduling import Member, Schedule, Timing, schedule_together
 from tests.example_counts import examples
+from tests.realizer.scheduling.recipes import schedule_block
 
 FACE = ("start", "attackPeak", "relax", "end")
 
