@@ -211,16 +211,11 @@ MIN_CHANGE = 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Contours:
-    """Pairs of FAPs of the inner and the outer contour, and their limits.
+    """Pairs of FAPs of the inner and the outer contour, and their limits."""
 
-    Attributes:
-        inner, outer: (10,) columns of FAP rows.
-        max_difference: (10,) FAPU, largest difference of the two values.
-    """
-
-    inner: Int32
-    outer: Int32
-    max_difference: Float32
+    inner: Int32  # (10,) columns of FAP rows
+    outer: Int32  # (10,) columns of FAP rows
+    max_difference: Float32  # (10,) FAPU, largest difference of the two values
 
 
 def contours_of(points: Mapping[str, Float32], fapu: Fapu) -> Contours:

@@ -19,28 +19,17 @@ ARRAYS = {
 
 @dataclass(frozen=True, eq=False)
 class Cards:
-    """Strips with pictures of hairs: hair, brows, lashes.
+    """Strips with pictures of hairs: hair, brows, lashes."""
 
-    Attributes:
-        roots: (c, k) int32 vertices of the mesh that each vertex of a card follows.
-        weights: (c, k) float32, place = weights @ vertices at the roots; a row sums to 1.
-        ups: (c, k) float32, normal = ups @ normals at the roots, at length 1.
-        triangles: (t, 3) int32 of the cards' vertices; they are seen from both sides.
-        uv: (c, 2) float32 in the face's maps; v runs along the hairs.
-        colours: (c, 3) uint8 sRGB.
-        occlusion, gloss: (c,) float32 0..1, as of a face.
-        parts: name -> (first, last + 1) vertex of the cards: hair, brows, lashes.
-    """
-
-    roots: Int32
-    weights: Float32
-    ups: Float32
-    triangles: Int32
-    uv: Float32
-    colours: UInt8
-    occlusion: Float32
-    gloss: Float32
-    parts: Mapping[str, tuple[int, int]]
+    roots: Int32  # (c, k) int32 vertices of the mesh that each vertex of a card follows
+    weights: Float32  # (c, k) float32, place = weights @ vertices at the roots; a row sums to 1
+    ups: Float32  # (c, k) float32, normal = ups @ normals at the roots, at length 1
+    triangles: Int32  # (t, 3) int32 of the cards' vertices; they are seen from both sides
+    uv: Float32  # (c, 2) float32 in the face's maps; v runs along the hairs
+    colours: UInt8  # (c, 3) uint8 sRGB
+    occlusion: Float32  # (c,) float32 0..1, as of a face
+    gloss: Float32  # (c,) float32 0..1, as of a face
+    parts: Mapping[str, tuple[int, int]]  # name -> (first, last + 1) vertex of the cards: hair, brows, lashes
 
 
 def read_cards(folder: Path, head: Mapping[str, Any], vertices: int) -> Cards | None:

@@ -29,34 +29,22 @@ class DrawnMesh:
     """What is drawn of a face: d vertices and t triangles.
 
     A vertex at a seam of the maps is there once for each of its places in them.
-
-    Attributes:
-        places: sparse (d, n) float32; drawn vertices = places @ vertices of the face.
-        strands: sparse (d, n) float32; direction of hairs = strands @ vertices of the face, of any length; 0
-            where there are no hairs.
-        ups: sparse (d, n) float32; drawn normals = ups @ normals of the face, at length 1.
-        triangles: (t, 3) int32, counter-clockwise seen from outside, part after part.
-        uv: (d, 2) float32, place in the maps, (0, 0) at the top left.
-        colours: (d, 3) uint8 sRGB, multiplied with the albedo map.
-        occlusion, gloss: (d,) float32 0..1.
-        kind: (d,) uint8, SKIN to CLOTH.
-        parts: name -> (first, last + 1) vertex.
-        two_sided: (t,) whether a triangle is seen from both sides.
-        see_through: (t,) whether the albedo map's alpha cuts holes into a triangle.
     """
 
-    places: Any
+    places: Any  # sparse (d, n) float32; drawn vertices = places @ vertices of the face
+    # Sparse (d, n) float32; direction of hairs = strands @ vertices of the face, of any length; 0 where there
+    # are no hairs.
     strands: Any
-    ups: Any
-    triangles: Int32
-    uv: Float32
-    colours: UInt8
-    occlusion: Float32
-    gloss: Float32
-    kind: UInt8
-    parts: Mapping[str, tuple[int, int]]
-    two_sided: Bool
-    see_through: Bool
+    ups: Any  # sparse (d, n) float32; drawn normals = ups @ normals of the face, at length 1
+    triangles: Int32  # (t, 3) int32, counter-clockwise seen from outside, part after part
+    uv: Float32  # (d, 2) float32, place in the maps, (0, 0) at the top left
+    colours: UInt8  # (d, 3) uint8 sRGB, multiplied with the albedo map
+    occlusion: Float32  # (d,) float32 0..1
+    gloss: Float32  # (d,) float32 0..1
+    kind: UInt8  # (d,) uint8, SKIN to CLOTH
+    parts: Mapping[str, tuple[int, int]]  # name -> (first, last + 1) vertex
+    two_sided: Bool  # (t,) whether a triangle is seen from both sides
+    see_through: Bool  # (t,) whether the albedo map's alpha cuts holes into a triangle
 
     @property
     def roughness(self) -> Float32:

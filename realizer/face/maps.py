@@ -16,28 +16,21 @@ SCALE = {"relief": 0.0, "texel": 1.0}  # defaults of [maps] in face.toml
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """The maps of a face as encoded pictures, and where its triangles are in them.
+    """The maps of a face as encoded pictures, and where its triangles are in them."""
 
-    Attributes:
-        files: name -> the bytes of a WebP; "albedo" is always there.
-            albedo: RGBA, sRGB; multiplied with the colours of vertices.
-            relief: grey, height; 128 is level. normal: the same as a normal map in tangent space, +y up.
-            surface: RGB: occlusion of small cavities, roughness, thickness (0 lets light through).
-            folds: grey, height of the wrinkles of expressions.
-        uv: (m, 3, 2) float32, place of each corner of each triangle in the maps, (0, 0) at the top left.
-        relief: metres that 255 steps of relief and folds are high.
-        texel: metres that a texel of a map of 2048 is wide.
-        see_through: (m,) triangles into which the alpha of the albedo map cuts holes.
-        folds: (n, r) float32 0..1, how much of each region's folds shows at each vertex.
-        regions: (r,) their names: a drive of `realizer/tables/wrinkles.toml`, and _left or _right.
-    """
-
+    # name -> the bytes of a WebP:
+    #     albedo, always there: RGBA, sRGB; multiplied with the colours of vertices.
+    #     relief: grey, height; 128 is level. normal: the same as a normal map in tangent space, +y up.
+    #     surface: RGB: occlusion of small cavities, roughness, thickness (0 lets light through).
+    #     folds: grey, height of the wrinkles of expressions.
     files: Mapping[str, bytes]
+    # (m, 3, 2) float32, place of each corner of each triangle in the maps, (0, 0) at the top left.
     uv: Float32
-    relief: float
-    texel: float
-    see_through: Bool
-    folds: Float32
+    relief: float  # metres that 255 steps of relief and folds are high
+    texel: float  # metres that a texel of a map of 2048 is wide
+    see_through: Bool  # (m,) triangles into which the alpha of the albedo map cuts holes
+    folds: Float32  # (n, r) float32 0..1, how much of each region's folds shows at each vertex
+    # (r,) their names: a drive of `realizer/tables/wrinkles.toml`, and _left or _right.
     regions: tuple[str, ...] = ()
 
 

@@ -19,23 +19,14 @@ MOST = 20_000  # triangles of a part that is coarse enough to be seen as such
 
 @dataclass(frozen=True, eq=False)
 class Subdivision:
-    """A face whose coarse parts have four times as many triangles.
+    """A face whose coarse parts have four times as many triangles."""
 
-    Attributes:
-        face: the face to draw; a part's new vertices, one an edge, follow those it had.
-        vertex: (n,) the face's vertex of each vertex of the original face, which does not move.
-        middle: (k,) the face's vertex on each of k edges.
-        smooth: sparse (k, n) float32; places of the vertices on edges = smooth @ original vertices.
-        mean: sparse (k, n) float32, the mean of the ends of each edge.
-        split: (m,) which of the original triangles have become four; those come first, in four runs.
-    """
-
-    face: Face
-    vertex: Int32
-    middle: Int32
-    smooth: Any
-    mean: Any
-    split: Bool
+    face: Face  # the face to draw; a part's new vertices, one an edge, follow those it had
+    vertex: Int32  # (n,) the face's vertex of each vertex of the original face, which does not move
+    middle: Int32  # (k,) the face's vertex on each of k edges
+    smooth: Any  # sparse (k, n) float32; places of the vertices on edges = smooth @ original vertices
+    mean: Any  # sparse (k, n) float32, the mean of the ends of each edge
+    split: Bool  # (m,) which of the original triangles have become four; those come first, in four runs
 
     def corners(self, values: Float32) -> Float32:
         """Return values of the drawn triangles' corners (m', 3, k), for those of the original (m, 3, k)."""

@@ -16,17 +16,12 @@ SLIVER = 1e-6  # of the height of a cut
 
 @dataclass(frozen=True, eq=False)
 class Submesh:
-    """A surface that is made from the base mesh.
+    """A surface that is made from the base mesh."""
 
-    Attributes:
-        mix: (n, n_base) sparse; vertices = mix @ base vertices + offset, and displacements likewise.
-        offset: (n, 3) metres.
-        triangles: (m, 3) counter-clockwise seen from outside.
-    """
-
+    # (n, n_base) sparse; vertices = mix @ base vertices + offset, and displacements likewise.
     mix: sp.csr_matrix
-    offset: Float64
-    triangles: Int32
+    offset: Float64  # (n, 3) metres
+    triangles: Int32  # (m, 3) counter-clockwise seen from outside
 
     @classmethod
     def of_quads(cls, quads: Int32, n_base: int) -> Submesh:
@@ -133,25 +128,18 @@ def mix_of(rows: Sequence[Mapping[int, float]], n: int) -> sp.csr_matrix:
 
 @dataclass(eq=False)
 class Part:
-    """A part of a face that is being built.
-
-    Attributes:
-        patch: where its vertices come from on the base mesh, or None.
-        vertices: (n, 3) metres; triangles: (m, 3); colours: (n, 3) sRGB 0..255; gloss: (n,) 0..1.
-        occlusion: (n,) 0..1, or None: to be baked.
-        fields: row number -> (n, 3), where the part brings its own.
-        uv: (n, 2) places in the maps, or None: it has none of its own.
-    """
+    """A part of a face that is being built."""
 
     name: str
-    patch: Submesh | None
-    vertices: Float64
-    triangles: Int32
-    colours: Float64
-    gloss: Float64
-    occlusion: Float64 | None = None
+    patch: Submesh | None  # where its vertices come from on the base mesh, or None
+    vertices: Float64  # (n, 3) metres
+    triangles: Int32  # (m, 3)
+    colours: Float64  # (n, 3) sRGB 0..255
+    gloss: Float64  # (n,) 0..1
+    occlusion: Float64 | None = None  # (n,) 0..1, or None: to be baked
+    # Row number -> (n, 3), where the part brings its own.
     fields: dict[int, Float64] = field(default_factory=dict)
-    uv: Float64 | None = None
+    uv: Float64 | None = None  # (n, 2) places in the maps, or None: it has none of its own
 
     def subset(self, index: Any, triangles: Int32) -> Part:
         """Return the part with only these of its vertices, (k,) indices, and other triangles over them."""

@@ -15,18 +15,13 @@ FADE_WIDTH = 0.008  # m on either side of the middle, in which an action unit of
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The density and direction functions of a displacement.
+    """The density and direction functions of a displacement."""
 
-    Attributes:
-        origin: (3,) metres, origin of their coordinates.
-        gaussians: (k, 10): height in metres, the rest in centimetres from the origin (`functions.density`).
-        alpha, beta: (19,) each (`functions.angle`), radians.
-    """
-
-    origin: Float64
+    origin: Float64  # (3,) metres, origin of their coordinates
+    # (k, 10): height in metres, the rest in centimetres from the origin (`functions.density`).
     gaussians: Float64
-    alpha: Float64
-    beta: Float64
+    alpha: Float64  # (19,) each (`functions.angle`), radians
+    beta: Float64  # (19,) each (`functions.angle`), radians
 
     def density(self, at: Float64) -> Float64:
         """Return the length (n,) of the displacement of points (n, 3) with full intensity, metres."""
@@ -47,17 +42,12 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Mouth:
-    """The bent plane between upper and lower face, through the corners of the mouth and along the lips.
+    """The bent plane between upper and lower face, through the corners of the mouth and along the lips."""
 
-    Attributes:
-        x: (k,) metres from the middle, from 0 to the corner.
-        y, z: (k,) metres, where the lips meet in front; slope: (k,) dy / dz of the plane there.
-    """
-
-    x: Float64
-    y: Float64
-    z: Float64
-    slope: Float64
+    x: Float64  # (k,) metres from the middle, from 0 to the corner
+    y: Float64  # (k,) metres, where the lips meet in front
+    z: Float64  # (k,) metres, where the lips meet in front
+    slope: Float64  # (k,) dy / dz of the plane there
 
     def above(self, at: Float64) -> Float64:
         """Return the height of points (n, 3) above the plane, (n,) metres."""
@@ -75,16 +65,11 @@ class Mouth:
 
 @dataclass(frozen=True, eq=False)
 class UnitModel:
-    """The model of one action unit: one motion, or one for each half of the face.
-
-    Attributes:
-        motions: "whole", or "upper" and "lower".
-        jaw_degrees: rotation of the lower teeth and the tongue with full intensity.
-    """
+    """The model of one action unit: one motion, or one for each half of the face."""
 
     au: int
-    motions: Mapping[str, Motion]
-    jaw_degrees: float = 0.0
+    motions: Mapping[str, Motion]  # "whole", or "upper" and "lower"
+    jaw_degrees: float = 0.0  # rotation of the lower teeth and the tongue with full intensity
 
     def displacement(self, at: Float64, mouth: Mouth, upper: Float64 | None = None) -> Float64:
         """Return the displacement (n, 3) of points (n, 3) of the face with full intensity, metres.
@@ -104,18 +89,12 @@ class UnitModel:
 
 @dataclass(frozen=True)
 class HeadTurn:
-    """The rotation of the head, which fades out between chin and collar (4.2.3).
+    """The rotation of the head, which fades out between chin and collar (4.2.3)."""
 
-    Attributes:
-        pivot: (3,) metres, centre of the rotation.
-        top, end: heights in metres at which the density is 1 and 0.
-        tilt: metres of height per metre of z.
-    """
-
-    pivot: tuple[float, float, float]
-    top: float
-    end: float
-    tilt: float
+    pivot: tuple[float, float, float]  # (3,) metres, centre of the rotation
+    top: float  # metres, height from which on the density is 1
+    end: float  # metres, height below which it is 0
+    tilt: float  # metres of height per metre of z
 
     def density(self, at: Float64) -> Float64:
         """Return the part of the head's rotation at points, (n,) 0..1."""
@@ -125,24 +104,18 @@ class HeadTurn:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The action units of a person's face.
+    """The action units of a person's face."""
 
-    Attributes:
-        form: "published" (one or two Gaussians) or "extended" (up to four).
-        source, licence: of the data that the model was fitted to.
-        units: number -> displacement unit.
-        degrees: number of an action unit that turns head or eyes -> degrees with full intensity.
-        eyes: (3,) metres, centres of the left and the right eyeball; jaw: (3,) metres, the jaw's joint.
-    """
-
-    form: str
-    source: str
-    licence: str
+    form: str  # "published" (one or two Gaussians) or "extended" (up to four)
+    source: str  # of the data that the model was fitted to
+    licence: str  # of the data that the model was fitted to
     mouth: Mouth
     head: HeadTurn
+    # (3,) metres, centres of the left and the right eyeball.
     eyes: tuple[tuple[float, float, float], tuple[float, float, float]]
-    jaw: tuple[float, float, float]
-    units: Mapping[int, UnitModel]
+    jaw: tuple[float, float, float]  # (3,) metres, the jaw's joint
+    units: Mapping[int, UnitModel]  # number -> displacement unit
+    # Number of an action unit that turns head or eyes -> degrees with full intensity.
     degrees: Mapping[int, float] = field(default_factory=dict)
 
     def displacement(self, au: int, at: Float64, side: str = "", upper: Float64 | None = None) -> Float64:

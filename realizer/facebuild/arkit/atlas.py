@@ -31,18 +31,12 @@ QUALITY = {"albedo": 92, "normal": 95, "surface": 92}  # of WebP: 1 to 4 MB toge
 
 @dataclass(frozen=True, eq=False)
 class Atlas:
-    """The maps of a head.
+    """The maps of a head."""
 
-    Attributes:
-        files: name of a map, as in `face.maps.NAMES` -> WebP.
-        uv: (m, 3, 2) uint16; see_through: (m,), as in `face.maps.Maps`.
-        gloss: (m,) of the triangles' materials, as in `Face.gloss`; NaN where the file says nothing.
-    """
-
-    files: Mapping[str, bytes]
-    uv: Any
-    see_through: Bool
-    gloss: Float64
+    files: Mapping[str, bytes]  # name of a map, as in `face.maps.NAMES` -> WebP
+    uv: Any  # (m, 3, 2) uint16
+    see_through: Bool  # (m,), as in `face.maps.Maps`
+    gloss: Float64  # (m,) of the triangles' materials, as in `Face.gloss`; NaN where the file says nothing
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,16 +27,11 @@ SURE, FAIR, GUESS = "sure", "fair", "guess"
 
 @dataclass(frozen=True)
 class FapSource:
-    """What moves a FAP.
-
-    Attributes:
-        made_by: the names of shapes, or in words what else.
-        sure: SURE: by the head itself; FAIR: one of shape and feature point is not its own; GUESS: both.
-    """
+    """What moves a FAP."""
 
     fap: int
-    made_by: str
-    sure: str
+    made_by: str  # the names of shapes, or in words what else
+    sure: str  # SURE: by the head itself; FAIR: one of shape and feature point is not its own; GUESS: both
 
 
 @dataclass(frozen=True)
@@ -103,18 +98,12 @@ def _ranges(numbers: list[int]) -> str:
 
 @dataclass(frozen=True)
 class Report:
-    """The report of an import.
+    """The report of an import."""
 
-    Attributes:
-        found: parts and features that were recognised; missing: those that were not, with the consequences.
-        unsure: guesses to check by eye.
-        faps: what moves each FAP; empty before that is known.
-    """
-
-    found: tuple[str, ...]
-    missing: tuple[str, ...]
-    unsure: tuple[str, ...]
-    faps: tuple[FapSource, ...] = ()
+    found: tuple[str, ...]  # parts and features that were recognised
+    missing: tuple[str, ...]  # those that were not, with the consequences
+    unsure: tuple[str, ...]  # guesses to check by eye
+    faps: tuple[FapSource, ...] = ()  # what moves each FAP; empty before that is known
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -125,16 +114,11 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class Head:
-    """A head on the way from a file to a face folder.
+    """A head on the way from a file to a face folder."""
 
-    Attributes:
-        surface: upright, in metres, its vertices part after part; ranges: part -> first, last + 1 vertex.
-        painted: whether the eyes are no balls of their own.
-    """
-
-    surface: Surface
-    ranges: dict[str, tuple[int, int]]
-    painted: bool
+    surface: Surface  # upright, in metres, its vertices part after part
+    ranges: dict[str, tuple[int, int]]  # part -> first, last + 1 vertex
+    painted: bool  # whether the eyes are no balls of their own
     gltf: Gltf
     report: Report
 

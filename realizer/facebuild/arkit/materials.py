@@ -14,18 +14,13 @@ DRAWN = {  # extensions of materials that the import keeps
 
 @dataclass(frozen=True)
 class Chart:
-    """Where the places of a texture come from.
+    """Where the places of a texture come from."""
 
-    Attributes:
-        name: the attribute, such as TEXCOORD_0.
-        offset, scale, rotation: as in KHR_texture_transform.
-        wrap: what is beyond the edges of the texture along u and v: REPEAT, CLAMP or MIRROR.
-    """
-
-    name: str = ""
-    offset: tuple[float, float] = (0, 0)
-    scale: tuple[float, float] = (1, 1)
-    rotation: float = 0
+    name: str = ""  # the attribute, such as TEXCOORD_0
+    offset: tuple[float, float] = (0, 0)  # as in KHR_texture_transform
+    scale: tuple[float, float] = (1, 1)  # as in KHR_texture_transform
+    rotation: float = 0  # as in KHR_texture_transform
+    # What is beyond the edges of the texture along u and v: REPEAT, CLAMP or MIRROR.
     wrap: tuple[int, int] = (REPEAT, REPEAT)
 
 
@@ -40,25 +35,16 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """What a surface looks like.
+    """What a surface looks like."""
 
-    Attributes:
-        name: its name, or "".
-        colour: linear RGB and alpha; emission: linear RGB.
-        roughness: 0..1, or None if the file says nothing about it.
-        alpha: OPAQUE, MASK or BLEND; cutoff: alpha below which MASK leaves nothing.
-        transmission: 0..1, how much light goes through.
-        textures: base, normal, roughness, occlusion, emission -> texture.
-    """
-
-    name: str
-    colour: tuple[float, ...]
-    emission: tuple[float, ...]
-    roughness: float | None
-    alpha: str
-    cutoff: float
-    transmission: float
-    textures: tuple[tuple[str, Texture], ...]
+    name: str  # its name, or ""
+    colour: tuple[float, ...]  # linear RGB and alpha
+    emission: tuple[float, ...]  # linear RGB
+    roughness: float | None  # 0..1, or None if the file says nothing about it
+    alpha: str  # OPAQUE, MASK or BLEND
+    cutoff: float  # alpha below which MASK leaves nothing
+    transmission: float  # 0..1, how much light goes through
+    textures: tuple[tuple[str, Texture], ...]  # base, normal, roughness, occlusion, emission -> texture
 
     @property
     def chart(self) -> Chart:

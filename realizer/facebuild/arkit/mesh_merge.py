@@ -22,25 +22,16 @@ SAME = 2e-6  # of the size of all; vertices nearer than that, that move alike, a
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A head as one mesh.
+    """A head as one mesh."""
 
-    Attributes:
-        vertices: (n, 3); triangles: (m, 3).
-        colours: (n, 3) sRGB 0..255, of the vertices alone.
-        piece: (n,) which piece a vertex came from; names: of each piece's material, mesh and node.
-        moves: ARKit's name -> (n, 3), at weight 1.
-        uv: (m, 3, 2) places of the corners of triangles in the textures of their materials.
-        material: (m,) which of the materials a triangle has.
-    """
-
-    vertices: Float64
-    triangles: Int32
-    colours: Float64
-    piece: Int32
-    names: tuple[tuple[str, str, str], ...]
-    moves: Mapping[str, Float64]
-    uv: Float64
-    material: Int32
+    vertices: Float64  # (n, 3)
+    triangles: Int32  # (m, 3)
+    colours: Float64  # (n, 3) sRGB 0..255, of the vertices alone
+    piece: Int32  # (n,) which piece a vertex came from
+    names: tuple[tuple[str, str, str], ...]  # of each piece's material, mesh and node
+    moves: Mapping[str, Float64]  # ARKit's name -> (n, 3), at weight 1
+    uv: Float64  # (m, 3, 2) places of the corners of triangles in the textures of their materials
+    material: Int32  # (m,) which of the materials a triangle has
     materials: tuple[Material, ...]
 
     def move(self, name: str) -> Float64:

@@ -22,20 +22,14 @@ BLUR = 12  # times; elsewhere the border between above and below is soft
 
 @dataclass(frozen=True, eq=False)
 class Mouth:
-    """The position of each vertex of the skin relative to the lips.
+    """The position of each vertex of the skin relative to the lips."""
 
-    Attributes:
-        knots: (5, n) how much each station along the lips has to say, right corner to left; they add to 1.
-        outer: (n,) 0 on the inner contour and in the mouth, 1 on the outer one and beyond.
-        upper: (n,) 1 above the slit, 0 below.
-        away: (n,) metres over the skin to the lips' contours.
-        along: (n,) -1 at the right corner .. 1 at the left, and so beyond.
-    """
-
+    # (5, n) how much each station along the lips has to say, right corner to left; they add to 1.
     knots: Float64
-    outer: Float64
-    upper: Float64
-    away: Float64
+    outer: Float64  # (n,) 0 on the inner contour and in the mouth, 1 on the outer one and beyond
+    upper: Float64  # (n,) 1 above the slit, 0 below
+    away: Float64  # (n,) metres over the skin to the lips' contours
+    # (n,) -1 at the right corner .. 1 at the left, and so beyond.
     along: Float64
 
 

@@ -22,25 +22,15 @@ EYE_SHAPES = ("eyeBlink", "eyeSquint", "eyeWide", "cheekSquint", "browDown", "br
 
 @dataclass(frozen=True)
 class Pose:
-    """The transformation of a file's head into the face folder's frame.
+    """The transformation of a file's head into the face folder's frame."""
 
-    Attributes:
-        turn: (3, 3) rotation of the file's axes.
-        scale: metres of the file's unit.
-        middle: (3,) point between the eyes, in the file's coordinates.
-        unit: the name of the file's unit; "" if it is unknown.
-        swapped: whether its left shapes move the character's right side.
-        notes: how it was found.
-        unsure: guesses that the user has to check.
-    """
-
-    turn: Float64
-    scale: float
-    middle: Float64
-    unit: str
-    swapped: bool
-    notes: tuple[str, ...]
-    unsure: tuple[str, ...]
+    turn: Float64  # (3, 3) rotation of the file's axes
+    scale: float  # metres of the file's unit
+    middle: Float64  # (3,) point between the eyes, in the file's coordinates
+    unit: str  # the name of the file's unit; "" if it is unknown
+    swapped: bool  # whether its left shapes move the character's right side
+    notes: tuple[str, ...]  # how it was found
+    unsure: tuple[str, ...]  # guesses that the user has to check
 
 
 def pose_of(surface: Surface) -> Pose:

@@ -28,18 +28,12 @@ ORDER = (
 
 @dataclass(frozen=True)
 class HeadParts:
-    """Which vertices are what.
+    """Which vertices are what."""
 
-    Attributes:
-        parts: name -> (k,) vertices, in the order that the face folder keeps them.
-        painted: the eyes are no balls of their own; they are part of the skin's mesh.
-        words: how parts were found; unsure: guesses to check by eye.
-    """
-
-    parts: dict[str, Any]
-    painted: bool
-    words: tuple[str, ...]
-    unsure: tuple[str, ...]
+    parts: dict[str, Any]  # name -> (k,) vertices, in the order that the face folder keeps them
+    painted: bool  # the eyes are no balls of their own; they are part of the skin's mesh
+    words: tuple[str, ...]  # how parts were found
+    unsure: tuple[str, ...]  # guesses to check by eye
 
 
 @dataclass(frozen=True)

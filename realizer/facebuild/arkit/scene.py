@@ -19,28 +19,17 @@ FARTHEST = 1000.0  # copies of a repeating texture
 
 @dataclass(eq=False)
 class Piece:
-    """A primitive in scene coordinates.
+    """A primitive in scene coordinates."""
 
-    Attributes:
-        names: names of its material, mesh and node; "" for a missing name.
-        vertices: (n, 3) in the unit and the axes of the file; triangles: (m, 3).
-        colours: (n, 3) sRGB 0..255, of the vertices alone.
-        uv: (n, 2) places in the textures of its material, (0, 0) at the top left.
-        material: what it looks like.
-        glass: whether the surface is transparent.
-        notes: what of its material will not be drawn.
-        moves: name of a morph target -> (n, 3) displacements.
-    """
-
-    names: tuple[str, str, str]
-    vertices: Float64
-    triangles: Int32
-    colours: Float64
-    uv: Float64
-    material: Material
-    glass: bool = False
-    notes: tuple[str, ...] = ()
-    moves: dict[str, Float64] = field(default_factory=dict)
+    names: tuple[str, str, str]  # names of its material, mesh and node; "" for a missing name
+    vertices: Float64  # (n, 3) in the unit and the axes of the file
+    triangles: Int32  # (m, 3)
+    colours: Float64  # (n, 3) sRGB 0..255, of the vertices alone
+    uv: Float64  # (n, 2) places in the textures of its material, (0, 0) at the top left
+    material: Material  # what it looks like
+    glass: bool = False  # whether the surface is transparent
+    notes: tuple[str, ...] = ()  # what of its material will not be drawn
+    moves: dict[str, Float64] = field(default_factory=dict)  # name of a morph target -> (n, 3) displacements
 
 
 def read_pieces(gltf: Gltf) -> list[Piece]:

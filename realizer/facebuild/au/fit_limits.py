@@ -27,17 +27,11 @@ REACH = 1e-3  # share of a half that counts as belonging to it
 
 @dataclass(frozen=True, eq=False)
 class WatchedPlaces:
-    """The places of a face at which a fit is limited.
+    """The places of a face at which a fit is limited."""
 
-    Attributes:
-        at: (n, 3) metres, all on the left (x >= 0).
-        upper: (n,) how far each belongs to the upper half, as the face's topology has it.
-        plane: (n,) and as the mouth's plane does.
-    """
-
-    at: Float64
-    upper: Float64
-    plane: Float64
+    at: Float64  # (n, 3) metres, all on the left (x >= 0)
+    upper: Float64  # (n,) how far each belongs to the upper half, as the face's topology has it
+    plane: Float64  # (n,) and as the mouth's plane does
 
     def of(self, half: str) -> Float64:
         """Return the places (k, 3) that the motion of "whole", "upper" or "lower" has any part in."""

@@ -20,20 +20,13 @@ FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided
 
 @dataclass(frozen=True, eq=False)
 class UnitMeasurement:
-    """An action unit shown with full intensity, measured.
+    """An action unit shown with full intensity, measured."""
 
-    Attributes:
-        au: its number.
-        at: (n, 3) metres, the landmarks on the neutral face.
-        moves: (n, 3) metres, where each goes.
-        visible: (n,) visibility: hidden points count little in a fit and are left out of its table.
-        upper: (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
-    """
-
-    au: int
-    at: Float64
-    moves: Float64
-    visible: Bool
+    au: int  # its number
+    at: Float64  # (n, 3) metres, the landmarks on the neutral face
+    moves: Float64  # (n, 3) metres, where each goes
+    visible: Bool  # (n,) visibility: hidden points count little in a fit and are left out of its table
+    # (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
     upper: Float64 | None = None
 
 

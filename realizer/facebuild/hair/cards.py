@@ -16,25 +16,17 @@ ROUND = 0.25  # how far the normals of a card turn to its sides, as if it were a
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Cards at rest: c vertices and t triangles.
+    """Cards at rest: c vertices and t triangles."""
 
-    Attributes:
-        places, ups: (c, 3) metres, and unit normals.
-        uv: (c, 2) place in the maps; colours: (c, 3) sRGB 0..255; occlusion, gloss: (c,) 0..1.
-        triangles: (t, 3).
-        skin: (c, 3) vertices of the mesh that a vertex's root lies between; -1 for hair on the skull.
-        shares: (c, 3) of those in its root; they sum to 1, or are 0 for hair on the skull.
-    """
-
-    places: Float64
-    ups: Float64
-    uv: Float64
-    colours: Float64
-    occlusion: Float64
-    gloss: Float64
-    triangles: Int32
-    skin: Int32
-    shares: Float64
+    places: Float64  # (c, 3) metres
+    ups: Float64  # (c, 3) unit normals
+    uv: Float64  # (c, 2) place in the maps
+    colours: Float64  # (c, 3) sRGB 0..255
+    occlusion: Float64  # (c,) 0..1
+    gloss: Float64  # (c,) 0..1
+    triangles: Int32  # (t, 3)
+    skin: Int32  # (c, 3) vertices of the mesh that a vertex's root lies between; -1 for hair on the skull
+    shares: Float64  # (c, 3) of those in its root; they sum to 1, or are 0 for hair on the skull
 
 
 def joined(patches: Sequence[Patch]) -> Patch:

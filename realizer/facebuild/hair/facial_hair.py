@@ -102,19 +102,12 @@ LASH_WIDE = 0.00036  # m; half of it is seen
 
 @dataclass(frozen=True, eq=False)
 class Margin:
-    """The edge of a lid.
+    """The edge of a lid."""
 
-    Attributes:
-        edge: vertices of the mesh from the inner to the outer corner.
-        fold: vertices on the lid's outside, which move less.
-        upper: whether it is the upper lid.
-        centre: (3,) metres, the eyeball's.
-    """
-
-    edge: Sequence[int]
-    fold: Sequence[int]
-    upper: bool
-    centre: Float64
+    edge: Sequence[int]  # vertices of the mesh from the inner to the outer corner
+    fold: Sequence[int]  # vertices on the lid's outside, which move less
+    upper: bool  # whether it is the upper lid
+    centre: Float64  # (3,) metres, the eyeball's
 
 
 def lashes(at: Float64, margin: Margin, colour: Any, length: float, rng: Any) -> Patch:

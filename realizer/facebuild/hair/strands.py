@@ -21,18 +21,12 @@ DOWN = np.array([0.0, -1.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class Strands:
-    """Lines of s strands with k + 1 places each, from root to tip.
+    """Lines of s strands with k + 1 places each, from root to tip."""
 
-    Attributes:
-        places, ups: (s, k + 1, 3) metres, and unit normals of the hair's surface there.
-        layer: (s,) 0 for the undermost, 1 for the outermost.
-        length: (s,) metres.
-    """
-
-    places: Float64
-    ups: Float64
-    layer: Float64
-    length: Float64
+    places: Float64  # (s, k + 1, 3) metres
+    ups: Float64  # (s, k + 1, 3) unit normals of the hair's surface there
+    layer: Float64  # (s,) 0 for the undermost, 1 for the outermost
+    length: Float64  # (s,) metres
 
 
 def unit(vectors: Any) -> Float64:

@@ -17,31 +17,21 @@ class Strip:
     """A part of the picture: what a card shows.
 
     A part is about as large as a card is in pictures: a smaller copy of a finer one is a grey square.
-
-    Attributes:
-        left, top, right, bottom: its sides, 0..1 of the picture.
-        strands: how many; width: of one, as a share of the strip's.
-        sway: how far a strand strays, as a share of the strip's width; waves: how often.
-        ends: the part of the height after which strands end.
-        begins: the part of the height before which strands begin.
-        tip: how far strands meet at the end, 0..1.
-        whole: strands reach the strip's sides and its end.
-        dashes: pieces that each strand is cut into; 0 is none.
     """
 
-    left: float
+    left: float  # 0..1 of the picture
     top: float
     right: float
     bottom: float
-    strands: int
-    width: float
-    sway: float = 0.06
-    waves: float = 0.7
-    ends: float = 0.75
-    begins: float = 0.03
-    tip: float = 0.3
-    whole: bool = False
-    dashes: int = 0
+    strands: int  # how many
+    width: float  # of one, as a share of the strip's
+    sway: float = 0.06  # how far a strand strays, as a share of the strip's width
+    waves: float = 0.7  # how often
+    ends: float = 0.75  # the part of the height after which strands end
+    begins: float = 0.03  # the part of the height before which strands begin
+    tip: float = 0.3  # how far strands meet at the end, 0..1
+    whole: bool = False  # strands reach the strip's sides and its end
+    dashes: int = 0  # pieces that each strand is cut into; 0 is none
 
 
 STRIPS: Mapping[str, Strip] = {

@@ -13,20 +13,14 @@ ASIDE = 0.002  # eye distances
 
 @dataclass(frozen=True, eq=False)
 class HeadGeometry:
-    """A head in its own measure.
+    """A head in its own measure."""
 
-    Attributes:
-        skin: (n, 3) in eye distances from the middle between the eyes; triangles: (m, 3).
-        ups: (n, 3) unit normals.
-        left, right: (3,) centres of the eyeballs; radius: theirs.
-    """
-
-    skin: Float64
-    triangles: Int32
-    ups: Float64
-    left: Float64
-    right: Float64
-    radius: float
+    skin: Float64  # (n, 3) in eye distances from the middle between the eyes
+    triangles: Int32  # (m, 3)
+    ups: Float64  # (n, 3) unit normals
+    left: Float64  # (3,) centre of the left eyeball
+    right: Float64  # (3,) centre of the right one
+    radius: float  # theirs
 
 
 def find_anchors(head: HeadGeometry) -> dict[str, Float64]:

@@ -23,31 +23,22 @@ MARGIN = 5e-4  # m; largest distance between a vertex and the mirror image of it
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """The zone of influence of a FAP's feature point (Paul 2010, 4.3.3).
+    """The zone of influence of a FAP's feature point (Paul 2010, 4.3.3)."""
 
-    Attributes:
-        fap: number of the FAP.
-        falloff: curve of the influence from the centre to the edge.
-        size: radius in metres; scale: factors of the radius along x, y and z.
-        ease: -100..100, for "ease"; smooth_centre, smooth_side: 0..1, for "smooth".
-        use_mask: only vertices of the FAP's mask move; invert_mask: only those outside it.
-        slide: metres forwards per metre along the FAP's direction, for skin that slides over a curve.
-        radial: 0..1, part of the displacement that points away from `pivot`, not in the FAP's direction.
-        pivot: (x, y, z) metres, for radial.
-    """
-
-    fap: int
-    falloff: Falloff
-    size: float
-    scale: Triple = (1.0, 1.0, 1.0)
-    ease: float = 0.0
-    smooth_centre: float = 0.0
-    smooth_side: float = 0.0
-    use_mask: bool = False
-    invert_mask: bool = False
+    fap: int  # number of the FAP
+    falloff: Falloff  # curve of the influence from the centre to the edge
+    size: float  # radius in metres
+    scale: Triple = (1.0, 1.0, 1.0)  # factors of the radius along x, y and z
+    ease: float = 0.0  # -100..100, for "ease"
+    smooth_centre: float = 0.0  # 0..1, for "smooth"
+    smooth_side: float = 0.0  # 0..1, for "smooth"
+    use_mask: bool = False  # only vertices of the FAP's mask move
+    invert_mask: bool = False  # only those outside it
+    # Metres forwards per metre along the FAP's direction, for skin that slides over a curve.
     slide: float = 0.0
+    # 0..1, part of the displacement that points away from `pivot`, not in the FAP's direction.
     radial: float = 0.0
-    pivot: Triple = (0.0, 0.0, 0.0)
+    pivot: Triple = (0.0, 0.0, 0.0)  # (x, y, z) metres, for radial
 
     def __post_init__(self) -> None:
         where = f"zone of FAP {self.fap}"
@@ -94,23 +85,15 @@ class Zone:
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """The parameters of the deformer of one head.
+    """The parameters of the deformer of one head."""
 
-    Attributes:
-        points: feature point -> (x, y, z) metres, the centres of the zones.
-        zones: FAP -> zone.
-        masks: FAP -> (k,) vertices that move, ascending.
-        synced: FAPs whose zone is mirrored to the other side.
-        joined: whether overlapping neighbours share their influence, so that equal FAPs move a lip evenly.
-        whole: FAPs without a zone that move a part of the head as a whole.
-    """
-
-    points: Mapping[str, Triple]
-    zones: Mapping[int, Zone]
-    masks: Mapping[int, Int32] = field(default_factory=dict)
-    synced: frozenset[int] = frozenset()
+    points: Mapping[str, Triple]  # feature point -> (x, y, z) metres, the centres of the zones
+    zones: Mapping[int, Zone]  # FAP -> zone
+    masks: Mapping[int, Int32] = field(default_factory=dict)  # FAP -> (k,) vertices that move, ascending
+    synced: frozenset[int] = frozenset()  # FAPs whose zone is mirrored to the other side
+    # Whether overlapping neighbours share their influence, so that equal FAPs move a lip evenly.
     joined: bool = True
-    whole: frozenset[int] = frozenset()
+    whole: frozenset[int] = frozenset()  # FAPs without a zone that move a part of the head as a whole
 
 
 def smooth_curve(distance: Any, centre: float, side: float) -> Float64:

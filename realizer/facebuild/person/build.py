@@ -44,14 +44,10 @@ PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 @dataclass(frozen=True, eq=False)
 class Photographs:
-    """What photographs change of a person made by a recipe.
+    """What photographs change of a person made by a recipe."""
 
-    Attributes:
-        warp: takes the base mesh (n, 3) to where they show it.
-        paint: takes the skin and its colours (k, 3), sRGB 0..255, to those that they show.
-    """
-
-    warp: Callable[[Float64], Float64]
+    warp: Callable[[Float64], Float64]  # takes the base mesh (n, 3) to where they show it
+    # Takes the skin and its colours (k, 3), sRGB 0..255, to those that they show.
     paint: Callable[[Skin, Float32], Float32]
 
 

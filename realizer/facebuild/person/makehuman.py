@@ -24,19 +24,12 @@ DECIMETRE = 0.1  # m; the data's unit
 
 @dataclass(frozen=True, eq=False)
 class BaseMesh:
-    """The base mesh.
+    """The base mesh."""
 
-    Attributes:
-        vertices: (n, 3) decimetres.
-        quads: group name -> (m, 4) vertex indices.
-        texture: (t, 2) texture coordinates, (0, 0) at the lower left.
-        corners: (m, 4) texture coordinates of each corner of the quads of the group "body".
-    """
-
-    vertices: Float64
-    quads: Mapping[str, Int32]
-    texture: Float64
-    corners: Int32
+    vertices: Float64  # (n, 3) decimetres
+    quads: Mapping[str, Int32]  # group name -> (m, 4) vertex indices
+    texture: Float64  # (t, 2) texture coordinates, (0, 0) at the lower left
+    corners: Int32  # (m, 4) texture coordinates of each corner of the quads of the group "body"
 
     def mirror(self) -> Int32:
         """Return each vertex's mirror image (n,), or the vertex itself."""

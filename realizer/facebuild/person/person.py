@@ -37,24 +37,16 @@ ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """The base mesh as one person.
+    """The base mesh as one person."""
 
-    Attributes:
-        ground: its vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
-        balls: centre (3,) and radius of the left and the right eyeball.
-        face: metres from hairline to chin.
-        jaw_pivot, head_pivot: (3,) the rotation centres of jaw and head.
-        floor: y of the plane that the bust ends in.
-        arch: half width and depth of the upper teeth's arch, metres.
-    """
-
+    # Its vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
     ground: Ground
-    balls: tuple[tuple[Float64, float], ...]
-    face: float
-    jaw_pivot: Float64
-    head_pivot: Float64
-    floor: float
-    arch: tuple[float, float]
+    balls: tuple[tuple[Float64, float], ...]  # centre (3,) and radius of the left and the right eyeball
+    face: float  # metres from hairline to chin
+    jaw_pivot: Float64  # (3,) rotation centre of the jaw
+    head_pivot: Float64  # (3,) rotation centre of the head
+    floor: float  # y of the plane that the bust ends in
+    arch: tuple[float, float]  # half width and depth of the upper teeth's arch, metres
 
     def turns(self) -> Float64:
         """Return how far each base vertex turns with the head, (n,): 1 above the jaw, 0 below the neck."""

@@ -49,22 +49,15 @@ class Appearance:
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """The recipe of a person.
+    """The recipe of a person."""
 
-    Attributes:
-        description: a sentence about them, for lists of faces.
-        targets: shape target -> weight 0..1; `*` in a name stands for both sides.
-        colours: what for -> sRGB 0..255.
-        hair: the style of the hair, and the figures it changes.
-        look: figures of `Appearance` that differ from the plain ones.
-        glasses: a style of `realizer/tables/glasses.toml`, and the figures it changes; empty for none.
-    """
-
-    description: str
-    targets: dict[str, float]
-    colours: dict[str, list[float]]
-    hair: dict[str, Any] = field(default_factory=dict)
+    description: str  # a sentence about them, for lists of faces
+    targets: dict[str, float]  # shape target -> weight 0..1; `*` in a name stands for both sides
+    colours: dict[str, list[float]]  # what for -> sRGB 0..255
+    hair: dict[str, Any] = field(default_factory=dict)  # the style of the hair, and the figures it changes
+    # Figures of `Appearance` that differ from the plain ones.
     look: dict[str, Any] = field(default_factory=dict)
+    # A style of `realizer/tables/glasses.toml`, and the figures it changes; empty for none.
     glasses: dict[str, Any] = field(default_factory=dict)
 
 

@@ -35,17 +35,11 @@ LOST = 0.004  # m; an outline further off, at the median, is not that of the fac
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a photograph says of places on the mesh.
+    """What a photograph says of places on the mesh."""
 
-    Attributes:
-        view: the photograph, mirrored so that its pose is right.
-        places: what is seen in it.
-        points: (k, 2) pixels of the places; or an outline (n, 2), on which they lie somewhere.
-    """
-
-    view: View
-    places: Places
-    points: Float64
+    view: View  # the photograph, mirrored so that its pose is right
+    places: Places  # what is seen in it
+    points: Float64  # (k, 2) pixels of the places; or an outline (n, 2), on which they lie somewhere
 
     def off(self, pose: Pose, at: Float64) -> tuple[Float64, Float64]:
         """Return how wrong a mesh (n, 3) and a pose are: directions (k, j, 2), metres along them (k, j)."""
@@ -63,15 +57,10 @@ class Sight:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A person as two photographs show them.
+    """A person as two photographs show them."""
 
-    Attributes:
-        person: the table [person] of the recipe.
-        sights: what is seen in the pictures, and `poses`: of the cameras; the front first.
-    """
-
-    person: dict[str, Any]
-    sights: tuple[Sight, Sight]
+    person: dict[str, Any]  # the table [person] of the recipe
+    sights: tuple[Sight, Sight]  # what is seen in the pictures, and `poses`: of the cameras; the front first
     poses: tuple[Pose, Pose]
 
 

@@ -38,16 +38,11 @@ class _Place:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where landmarks lie on the base mesh.
+    """Where landmarks lie on the base mesh."""
 
-    Attributes:
-        numbers: (k,) of the landmarks.
-        corners: (k, 3) base vertices; shares: (k, 3) of them.
-    """
-
-    numbers: Index
-    corners: Index
-    shares: Float64
+    numbers: Index  # (k,) of the landmarks
+    corners: Index  # (k, 3) base vertices
+    shares: Float64  # (k, 3) of them
 
     @classmethod
     def of(cls, view: str) -> Places:
@@ -71,17 +66,11 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How a camera sees a head.
+    """How a camera sees a head."""
 
-    Attributes:
-        turn: (3,) rotation vector of the head, radians.
-        size: pixels a metre, at the distance of the eyes.
-        middle: (2,) pixels of the point between the eyes.
-    """
-
-    turn: Float64
-    size: float
-    middle: Float64
+    turn: Float64  # (3,) rotation vector of the head, radians
+    size: float  # pixels a metre, at the distance of the eyes
+    middle: Float64  # (2,) pixels of the point between the eyes
 
     def __call__(self, at: Any) -> tuple[Float64, Float64]:
         """Return the pixels (n, 2) of places (n, 3), and how near they are (n,), in metres."""

@@ -31,15 +31,11 @@ SEEN = 0.25  # weight from which on a texel shows the pictures alone
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """What a photograph shows at the texels of a skin.
+    """What a photograph shows at the texels of a skin."""
 
-    Attributes:
-        colours: (k, 3) light 0..1; weight: (k,) 0..1, how much they count; normals: (k, 3) as it sees them.
-    """
-
-    colours: Float32
-    weight: Float32
-    normals: Float64
+    colours: Float32  # (k, 3) light 0..1
+    weight: Float32  # (k,) 0..1, how much they count
+    normals: Float64  # (k, 3) as it sees them
 
 
 class Painter:

@@ -31,22 +31,14 @@ GREY = 3  # steps of 255 by which the channels of a grey picture differ at most
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A photograph of a face.
+    """A photograph of a face."""
 
-    Attributes:
-        image: RGB; that from the side is mirrored, if need be, so that the face looks to its right.
-        points: (468, 2) pixels, or None: the face is in profile, where no landmark is found.
-        region: where the face is.
-        turn: degrees to its left, roughly; 90 in profile.
-        irises: (2, 2) pixels of the middles of the irises; `iris`: pixels of their mean diameter.
-    """
-
-    image: Image
-    points: Float64 | None
-    region: Region
-    turn: float
-    irises: Float64
-    iris: float
+    image: Image  # RGB; that from the side is mirrored, if need be, so that the face looks to its right
+    points: Float64 | None  # (468, 2) pixels, or None: the face is in profile, where no landmark is found
+    region: Region  # where the face is
+    turn: float  # degrees to its left, roughly; 90 in profile
+    irises: Float64  # (2, 2) pixels of the middles of the irises
+    iris: float  # pixels of their mean diameter
 
 
 def read_views(front: Path, side: Path) -> tuple[View, View]:

@@ -21,14 +21,10 @@ MIRROR = np.array([-1.0, 1.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class Warp:
-    """A smooth map of space: a spline through the moves of some places (biharmonic, Carr et al. 2001).
+    """A smooth map of space: a spline through the moves of some places (biharmonic, Carr et al. 2001)."""
 
-    Attributes:
-        places, moves: (k, 3) metres; mirror images of each other on both sides.
-    """
-
-    places: Float64
-    moves: Float64
+    places: Float64  # (k, 3) metres; mirror images of each other on both sides
+    moves: Float64  # (k, 3) metres; mirror images of each other on both sides
 
     def __call__(self, at: Float64) -> Float64:
         """Return where places (n, 3) go; those far from the face stay."""

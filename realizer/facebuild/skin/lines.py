@@ -25,23 +25,15 @@ NEAR = 0.0025  # m further away, at which a line has a third of the say
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line as it is seen from a direction.
+    """A line as it is seen from a direction."""
 
-    Attributes:
-        row: its figures in `realizer/tables/skin_lines.toml`; side: 1 left, -1 right.
-        path: (j, 2) metres to the right and up, as seen from `towards`.
-        right, towards: (3,) directions.
-        share: (j,) how deep it is along it.
-        drives: region -> (j,) 0..1, what folds the skin along it.
-    """
-
-    row: dict[str, Any]
-    side: int
-    path: Float64
-    right: Float64
-    towards: Float64
-    share: Float64
-    drives: dict[str, Float64]
+    row: dict[str, Any]  # its figures in `realizer/tables/skin_lines.toml`
+    side: int  # 1 left, -1 right
+    path: Float64  # (j, 2) metres to the right and up, as seen from `towards`
+    right: Float64  # (3,) directions
+    towards: Float64  # (3,) directions
+    share: Float64  # (j,) how deep it is along it
+    drives: dict[str, Float64]  # region -> (j,) 0..1, what folds the skin along it
 
     def near(self, at: Any, ups: Any, reach: float) -> tuple[Any, Float64, Any]:
         """Return which places (j,) are within reach of the line, their distance and their nearest point."""

@@ -32,18 +32,13 @@ QUALITY = {"albedo": 84, "relief": 90, "surface": 78, "folds": 84}  # of WebP, 0
 
 @dataclass(frozen=True, eq=False)
 class SkinMaps:
-    """The maps of a face, and where its skin is in them.
+    """The maps of a face, and where its skin is in them."""
 
-    Attributes:
-        pictures: albedo (s, s, 4), relief (s, s), surface (s, s, 3) and folds (s, s), as in a face folder.
-        corners: (m, 3, 2) places in the maps, 0..1, of the corners of the skin's triangles.
-        regions: names of the regions of folds; weights: (n, regions) 0..1 of the skin's vertices.
-    """
-
+    # Albedo (s, s, 4), relief (s, s), surface (s, s, 3) and folds (s, s), as in a face folder.
     pictures: Mapping[str, UInt8]
-    corners: Float64
-    regions: tuple[str, ...]
-    weights: Float32
+    corners: Float64  # (m, 3, 2) places in the maps, 0..1, of the corners of the skin's triangles
+    regions: tuple[str, ...]  # names of the regions of folds
+    weights: Float32  # (n, regions) 0..1 of the skin's vertices
 
     def write(self, folder: Path) -> None:
         """Write the pictures as WebP."""

@@ -21,17 +21,12 @@ DEEP, AROUND = 0.00018, 6.0
 
 @dataclass(frozen=True, eq=False)
 class Relief:
-    """Heights of a skin at its texels.
+    """Heights of a skin at its texels."""
 
-    Attributes:
-        rest: (k,) metres at rest; folds: (k,) metres, of all expressions' folds at full.
-        pores: (k,) 0..1, how deep in a pore; lines: (k,) 0..1, how deep in a line at rest.
-    """
-
-    rest: Float32
-    folds: Float32
-    pores: Float32
-    lines: Float32
+    rest: Float32  # (k,) metres at rest
+    folds: Float32  # (k,) metres, of all expressions' folds at full
+    pores: Float32  # (k,) 0..1, how deep in a pore
+    lines: Float32  # (k,) 0..1, how deep in a line at rest
 
 
 def relief_of(skin: Skin, lines: list[Line]) -> Relief:
