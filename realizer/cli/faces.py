@@ -150,7 +150,7 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
     from realizer.facebuild.arkit.importer import import_head
 
     folder = output or Path("faces") / (name or head.stem)
-    with waiting("importing"):
+    with waiting("importing"), inputs.reporting(FaceError):
         report = import_head(head, folder, name or folder.name)
     for line in report.lines:
         click.echo(line)

@@ -111,10 +111,10 @@ def parse_size(context: click.Context, parameter: click.Parameter, value: str) -
 
 def check_face(name: str | None) -> str | None:
     """Return a face that is there, by name or path; the error lists those that are."""
-    from realizer.core.errors import UnknownFaceError
+    from realizer.core.errors import FaceError
     from realizer.face.load import folder_of
 
-    with reporting(UnknownFaceError, wrong=bad("--face")):
+    with reporting(FaceError, wrong=bad("--face")):
         try:
             folder_of("default" if name is None else name)
         except FileNotFoundError as error:

@@ -12,9 +12,14 @@ from realizer.core.errors import FaceError
 from realizer.face.reading import read_arrays
 
 FILE = "cards.npz"
-ARRAYS = {
-    "roots": 2, "weights": 2, "ups": 2, "triangles": 2, "uv": 2, "colours": 2, "occlusion": 1, "gloss": 1,
+# Figures of a vertex of cards: how many (0: as many as roots; None: a plain number), their type, and of those
+# that are stored as whole numbers what stands for 1.
+FIGURES: Mapping[str, tuple[int | None, Any, int]] = {
+    "roots": (0, np.int32, 1), "weights": (0, np.float32, 1), "ups": (0, np.float32, 1),
+    "uv": (2, np.float32, 65535), "colours": (3, np.uint8, 1),
+    "occlusion": (None, np.float32, 255), "gloss": (None, np.float32, 255),
 }  # fmt: skip
+ARRAYS = {"triangles": 2} | {name: 1 if width is None else 2 for name, (width, *_) in FIGURES.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,27 +59,11 @@ def read_cards(folder: Path, head: Mapping[str, Any], vertices: int) -> Cards | 
                 f"{path}: {name}: wanted indices 0..{most - 1}, got {indices.min()}..{indices.max()}"
             )
     each = arrays["roots"].shape[1]
-    widths = {
-        "roots": each,
-        "weights": each,
-        "ups": each,
-        "uv": 2,
-        "colours": 3,
-        "occlusion": None,
-        "gloss": None,
-    }
-    for name, width in widths.items():
-        shape = (count, width) if width else (count,)
+    found = {}
+    for name, (width, kind, most) in FIGURES.items():
+        shape = (count,) if width is None else (count, width or each)
         if arrays[name].shape != shape or not np.isfinite(arrays[name]).all():
             raise FaceError(f"{path}: {name}: wanted finite numbers {shape}, got {arrays[name].shape}")
-    return Cards(
-        roots=arrays["roots"].astype(np.int32),
-        weights=arrays["weights"].astype(np.float32),
-        ups=arrays["ups"].astype(np.float32),
-        triangles=arrays["triangles"].astype(np.int32),
-        uv=arrays["uv"].astype(np.float32) / np.float32(65535),
-        colours=arrays["colours"].astype(np.uint8),
-        occlusion=arrays["occlusion"].astype(np.float32) / np.float32(255),
-        gloss=arrays["gloss"].astype(np.float32) / np.float32(255),
-        parts={name: (int(a), int(b)) for name, (a, b) in head.get("cards", {}).items()},
-    )
+        found[name] = arrays[name].astype(kind) / kind(most) if most > 1 else arrays[name].astype(kind)
+    parts = {name: (int(a), int(b)) for name, (a, b) in head.get("cards", {}).items()}
+    return Cards(triangles=arrays["triangles"].astype(np.int32), parts=parts, **found)

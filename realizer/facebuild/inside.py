@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.face.mesh_geometry import edges_of, triangle_normals
+from realizer.face.mesh_geometry import FINE, edges_of, nearest_points, triangle_normals
 
 AROUND = 16  # number of nearest triangles to look at
-FINE = 1e3  # places in millimetres: the sizes for which trimesh's tolerances are meant
 SAME = 1e-7  # m
 MOST = 0.004  # m from a triangle's middle to its corners that are looked at
 
@@ -33,7 +32,6 @@ def depths(places: Float64, at: Float64, triangles: Int32, near: float) -> tuple
     from scipy.spatial import cKDTree
     from trimesh import triangles as shapes
 
-    nearest: Any = shapes.closest_point
     angles: Any = shapes.angles
     depth, way = np.full(len(places), -np.inf), np.zeros(places.shape)
     corners = at[triangles]
@@ -45,8 +43,7 @@ def depths(places: Float64, at: Float64, triangles: Int32, near: float) -> tuple
     known = np.isfinite(away[close])
     found = np.where(known, found[close], found[close, :1])
     here = places[close]
-    points = nearest(FINE * corners[found.ravel()], FINE * np.repeat(here, AROUND, axis=0)) / FINE
-    points = points.reshape(*found.shape, 3)
+    points = nearest_points(corners[found], here, FINE)
     off = np.linalg.norm(points - here[:, None], axis=2)
     least = off.min(axis=1)
     # All triangles that have the nearest point, each by its angle there.

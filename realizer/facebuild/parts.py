@@ -141,6 +141,12 @@ class Part:
     fields: dict[int, Float64] = field(default_factory=dict)
     uv: Float64 | None = None  # (n, 2) places in the maps, or None: it has none of its own
 
+    @property
+    def submesh(self) -> Submesh:
+        """The patch of a part that comes from the base mesh."""
+        assert self.patch is not None
+        return self.patch
+
     def subset(self, index: Any, triangles: Int32) -> Part:
         """Return the part with only these of its vertices, (k,) indices, and other triangles over them."""
         patch = self.patch and Submesh(self.patch.mix[index], self.patch.offset[index], triangles)

@@ -1,13 +1,11 @@
 """The regions of a face that action units move: both halves at the mouth, the skin, and what grows on it."""
 
-from typing import Any
-
 import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.model import Mouth
-from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
+from realizer.face.mesh_geometry import corner_shares, edge_graph, half_edges, nearest_points, part_triangles
 from realizer.face.model import Face
 
 UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
@@ -111,22 +109,18 @@ def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
     """
     from scipy.sparse.csgraph import dijkstra
     from scipy.spatial import cKDTree
-    from trimesh import triangles
 
     skin = part_triangles(face.triangles, face.parts["skin"]) + face.parts["skin"][0]
     corners = face.vertices[skin].astype(np.float64)
     first, last = face.parts[part]
     at = face.vertices[first:last].astype(np.float64)
     near = np.asarray(cKDTree(corners.mean(axis=1)).query(at, min(AROUND, len(skin)))[1]).reshape(len(at), -1)
-    many = np.repeat(at, near.shape[1], axis=0)
-    nearest: Any = triangles.closest_point
-    shares: Any = triangles.points_to_barycentric
-    places = nearest(corners[near.ravel()], many).reshape(*near.shape, 3)
+    places = nearest_points(corners[near], at)
     off = np.linalg.norm(places - at[:, None], axis=2)
     best = off.argmin(axis=1)
     each = np.arange(len(at))
     hit, place, off = near[each, best], places[each, best], off[each, best]
-    share = np.clip(shares(corners[hit], place), 0, 1)
+    share = corner_shares(corners[hit], place)
     # Parts far from the skin are bound to their nearest place on it as well.
     edges = half_edges(part_triangles(face.triangles, face.parts[part]))
     attached = np.flatnonzero(off < NEAR)
@@ -137,4 +131,4 @@ def skin_roots(face: Face, part: str) -> tuple[Int32, Float64]:
             graph, directed=False, indices=attached, min_only=True, return_predecessors=True
         )
         root[np.isfinite(away)] = source[np.isfinite(away)]
-    return skin[hit[root]], np.asarray(share[root] / share[root].sum(axis=1)[:, None])
+    return skin[hit[root]], share[root]

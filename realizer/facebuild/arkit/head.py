@@ -155,9 +155,7 @@ def read_head(path: Path) -> Head:
         parts = sort_parts(surface)
     except FaceError as error:
         raise FaceError(f"{path}: {error}") from None
-    surface = surface.subset(np.concatenate(list(parts.parts.values())))
-    ends = np.cumsum([0] + [len(index) for index in parts.parts.values()])
-    ranges = {name: (int(ends[k]), int(ends[k + 1])) for k, name in enumerate(parts.parts)}
+    surface, ranges = parts.arranged(surface)
     fit = ball_behind if parts.painted else fit_ball
     balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,12 @@ class HeadParts:
     painted: bool  # the eyes are no balls of their own; they are part of the skin's mesh
     words: tuple[str, ...]  # how parts were found
     unsure: tuple[str, ...]  # guesses to check by eye
+
+    def arranged(self, surface: Surface) -> tuple[Surface, dict[str, tuple[int, int]]]:
+        """Return the surface with its vertices part after part, and each part's first vertex and last + 1."""
+        ends = np.cumsum([0] + [len(index) for index in self.parts.values()]).tolist()
+        whole = surface.subset(np.concatenate(list(self.parts.values())))
+        return whole, dict(zip(self.parts, pairwise(ends), strict=True))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,13 @@ from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
 from realizer.face.au.regions import fit_mouth, shares
 from realizer.face.au.units import Unit, units
-from realizer.face.mesh_geometry import part_triangles, triangle_normals, vertex_normals
+from realizer.face.mesh_geometry import (
+    corner_shares,
+    nearest_points,
+    part_triangles,
+    triangle_normals,
+    vertex_normals,
+)
 from realizer.face.model import Face
 from realizer.facebuild.au.measure import UnitMeasurement
 from realizer.facebuild.parts import Submesh
@@ -88,7 +94,6 @@ def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Fl
         (n, 3) base vertices, (n, 3) their shares, and (n,) metres that each vertex is off.
     """
     from scipy.spatial import cKDTree
-    from trimesh import triangles
 
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
@@ -99,17 +104,13 @@ def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Fl
     corners = ground.at[base]
     faces = triangle_normals(ground.at, base)
     near = np.asarray(cKDTree(corners.mean(axis=1)).query(skin, AROUND)[1])
-    many = np.repeat(skin, AROUND, axis=0)
-    nearest: Any = triangles.closest_point
-    shares: Any = triangles.points_to_barycentric
-    places = nearest(corners[near.ravel()], many).reshape(*near.shape, 3)
+    places = nearest_points(corners[near], skin)
     off = np.linalg.norm(places - skin[:, None], axis=2)
     same = np.einsum("nkc,nc->nk", faces[near], ups) > 0
     best = np.where(same, off, off + OFF).argmin(axis=1)
     each = np.arange(len(skin))
     hit = near[each, best]
-    share = np.clip(shares(corners[hit], places[each, best]), 0, 1)
-    return base[hit].astype(np.int32), share / share.sum(axis=1)[:, None], off[each, best]
+    return base[hit].astype(np.int32), corner_shares(corners[hit], places[each, best]), off[each, best]
 
 
 def _sides(data: Path, name: str) -> tuple[str, ...]:

@@ -93,8 +93,7 @@ def build_face(
     (folder / CARDS).unlink(missing_ok=True)
     write_face(folder, name, recipe.description, person, made, fields, maps)
     progress("grow hair, brows, lashes and beard")
-    patch = made[0].patch
-    assert patch is not None
+    patch = made[0].submesh
     margins = lid_margins(lids, person, patch.sources())
     bearded = np.asarray(patch.mix @ skin_colours.beard(person.ground, lips))
     write_cards(folder, face_cards(load_folder(folder, "mpeg4"), recipe, margins, bearded))

@@ -82,13 +82,11 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
 
 
 def _line_mouth(skin: Part, person: Person, lips: Lips) -> None:
-    patch = skin.patch
-    assert patch is not None
     assert skin.occlusion is not None
     deep = person.ground.point("2.2")[2] - skin.vertices[:, 2]
     # Right behind the corners it stays dark: seen from the side, closed lips show a hair of it.
     corners = smooth(np.abs(lips.u), 0.70, 0.92) * smooth(lips.fade, 0.45, 0.75)
-    share = patch.mix @ (lips.inside * (1 - corners))
+    share = skin.submesh.mix @ (lips.inside * (1 - corners))
     skin_colours.light_mouth(skin.occlusion, share, deep)
 
 

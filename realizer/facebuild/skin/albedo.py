@@ -151,9 +151,7 @@ def _dots(skin: Skin, out: Float32, name: str, where: Any, colour: Float32) -> N
 
 
 def _scalp(skin: Skin, out: Float32) -> None:
-    patch = skin.part.patch
-    assert patch is not None
-    ground, style = skin.person.ground, style_of(skin.recipe.hair)
+    patch, ground, style = skin.part.submesh, skin.person.ground, style_of(skin.recipe.hair)
     points = {name: ground.point(name) for name in ground.points}
     scalp = Scalp(patch.positions(ground.at), patch.triangles, points, style.line, style.rise)
     ragged = 0.004 * skin.noise(0.005, 45)

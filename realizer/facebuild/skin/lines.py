@@ -192,8 +192,7 @@ def weights(skin: Skin, lines: list[Line], ups: Float64) -> Float32:
 
 def vertex_mask(skin: Skin, name: str) -> Float64:
     """Return where the lines around the mouth and the dimples of the chin are, 0..1 (n,) at vertices."""
-    patch, ground = skin.part.patch, skin.person.ground
-    assert patch is not None
+    patch, ground = skin.part.submesh, skin.person.ground
     if name == "dimples":
         return np.asarray(patch.mix @ ground.ellipsoid(ground.point("2.10"), (0.026, 0.020, 0.03)))
     return np.asarray(patch.mix @ (np.asarray(skin.lips.lips) > 0.02).astype(float))

@@ -83,9 +83,7 @@ def bake(
         size: texels of a side.
         paint: takes the skin and its colours (k, 3), sRGB 0..255, to other colours.
     """
-    patch = part.patch
-    assert patch is not None
-    corners = atlas.corners(person.ground.mesh, patch)
+    corners = atlas.corners(person.ground.mesh, part.submesh)
     texels = Texels(part.vertices, part.triangles, corners, size)
     skin = Skin(texels, part, person, lips, lids, recipe, zlib.crc32(name.encode()) % 2**20)
     lines = lines_of(skin)

@@ -151,10 +151,8 @@ def _thickness(skin: Skin) -> Float32:
     full = skin.table["thickness"]["full"]
     part = skin.part
     ups = vertex_normals(part.vertices, part.triangles)
-    patch = part.patch
-    assert patch is not None
     # No light comes from inside the mouth.
-    outside = np.flatnonzero(patch.mix @ (~skin.lips.inside * 1.0) > 0.5)
+    outside = np.flatnonzero(part.submesh.mix @ (~skin.lips.inside * 1.0) > 0.5)
     through = distance_through(part.vertices, ups, outside, full) / full
     # Behind lids and lips is no air but an eye or teeth.
     ears = skin.around("10.1", "10.2", "10.3", "10.4", "10.7", "10.8", radii=(0.04, 0.04, 0.04))

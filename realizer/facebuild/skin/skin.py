@@ -114,9 +114,7 @@ class Skin:
 
     def field(self, values: Any) -> Float32:
         """Return values of the base mesh's vertices (n, ...) at the texels (k, ...)."""
-        patch = self.part.patch
-        assert patch is not None
-        return self.texels.spread(patch.mix @ np.asarray(values, float))
+        return self.texels.spread(self.part.submesh.mix @ np.asarray(values, float))
 
     def around(self, *names: str, radii: Any, off: Any = (0, 0, 0)) -> Float32:
         """Return 0..1 (k,): 1 at feature points and off them, 0 outside ellipsoids around them."""

@@ -62,9 +62,7 @@ def import_bare(path: Path, folder: Path, name: str) -> tuple[str, ...]:
             parts = sort_parts(surface)
         except FaceError as error:
             raise FaceError(f"{path.name}: {error}") from None
-        surface = surface.subset(np.concatenate(list(parts.parts.values())))
-        ends = np.cumsum([0] + [len(index) for index in parts.parts.values()]).tolist()
-        ranges = {part: (ends[k], ends[k + 1]) for k, part in enumerate(parts.parts)}
+        surface, ranges = parts.arranged(surface)
         folder.mkdir(parents=True, exist_ok=True)
         describe_head(folder / "face.toml", name, Head(surface, ranges, False, gltf, Report((), (), ())))
         points, guesses = points_of(surface, ranges)

@@ -112,9 +112,9 @@ def test_import_names_the_face_after_the_option_the_folder_or_the_file(
     assert calls == [(Path("faces/anna"), "anna"), (tmp_path / "eve", "eve"), (Path("faces/mia"), "mia")]
 
 
-def test_import_of_a_file_that_is_no_head_exits_with_3(head: Path, tmp_path: Path) -> None:
+def test_import_of_a_file_that_is_no_head_exits_with_2(head: Path, tmp_path: Path) -> None:
     done = run("faces", "import", str(head), "-o", str(tmp_path / "x"))
-    assert done.returncode == 3
+    assert done.returncode == 2
     assert "anna.glb" in done.stderr
     assert not (tmp_path / "x").exists()
 

@@ -8,13 +8,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.face.mesh_geometry import (
+    FINE,
     components,
+    corner_shares,
     edge_graph,
     edges_of,
     fit_ball,
     flat_cross,
     half_edges,
     mirror_twins,
+    nearest_points,
     neighbour_mean,
     part_triangles,
     triangle_normals,
@@ -99,3 +102,19 @@ def test_components_are_numbered() -> None:
 
 def test_flat_cross_is_the_area_between_two_vectors() -> None:
     assert flat_cross(np.array([[2.0, 0]]), np.array([1.0, 3])).tolist() == [6]
+
+
+def test_nearest_points_of_triangles_lie_on_them() -> None:
+    corners = np.array(
+        [[[0, 0, 0], [0.002, 0, 0], [0, 0.002, 0]], [[0, 0, 0.01], [1, 0, 0.01], [0, 1, 0.01]]]
+    )
+    at = np.array([[0.0005, 0.0005, 0.001], [-0.001, 0.001, 0.0]])
+    found = nearest_points(np.stack([corners] * 2), at, FINE)
+    assert found[:, 0] == pytest.approx(np.array([[0.0005, 0.0005, 0], [0, 0.001, 0]]), abs=1e-9)
+    assert found[0, 1] == pytest.approx([0.0005, 0.0005, 0.01], abs=1e-9)
+
+
+def test_corner_shares_give_the_place_back() -> None:
+    corners = np.array([[[0, 0, 0], [2, 0, 0], [0, 4, 0]]], float)
+    shares = corner_shares(corners, np.array([[0.5, 1.0, 0]]))
+    assert shares == pytest.approx(np.array([[0.5, 0.25, 0.25]]))
