@@ -12,7 +12,7 @@ from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.drawn_mesh import drawn_mesh
 from realizer.face.model import Face
-from realizer.facebuild.inside import depths, without_rim
+from realizer.facebuild.hair.face_cards import depths, without_rim
 from realizer.facebuild.mpeg4.fap_limits import accompanying_faps, usual_range
 from realizer.speech.silent import SilentVoice
 from realizer.tables import action_units, faps

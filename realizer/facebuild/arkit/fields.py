@@ -13,7 +13,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import half_edges, neighbour_mean
-from realizer.facebuild.arkit.mouth_coordinates import Mouth
+from realizer.facebuild.arkit.mouth import Mouth
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.facebuild.mpeg4.zones import Triple
 from realizer.facebuild.parts import smooth

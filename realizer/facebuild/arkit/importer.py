@@ -20,9 +20,8 @@ from realizer.face.model import Face
 from realizer.facebuild.arkit.atlas import SIZE, Atlas, make_atlas
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
 from realizer.facebuild.arkit.head import Head, Report, fap_sources, read_head
-from realizer.facebuild.arkit.jaw import drag_of, joint_of
 from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.facebuild.arkit.mouth_coordinates import mouth_of
+from realizer.facebuild.arkit.mouth import drag_of, joint_of, mouth_of
 from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.arkit.points import points_of
 from realizer.facebuild.au.measure import UnitMeasurement, write_shapes

@@ -13,9 +13,8 @@ import numpy as np
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import flat_cross, triangle_normals, vertex_normals
-from realizer.facebuild.hair.cards import Patch, ribbons
+from realizer.facebuild.hair.cards import LEVEL, Patch, ribbons
 from realizer.facebuild.hair.strands import unit
-from realizer.facebuild.hair.texture import LEVEL
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.recipe import Appearance
 from realizer.facebuild.person.scalp import Scalp

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.facebuild.hair.cards import Patch, joined, ribbons
+from realizer.facebuild.hair.cards import LEVEL, Patch, joined, place, ribbons
 from realizer.facebuild.hair.strands import Strands, edge, grow, roots, unit
 from realizer.facebuild.hair.style import GREY, Style, colour_of
-from realizer.facebuild.hair.texture import LEVEL, place
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 

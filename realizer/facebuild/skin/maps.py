@@ -11,7 +11,7 @@ import numpy as np
 from realizer.core.array_types import Float32, Float64, UInt8
 from realizer.face.mesh_geometry import vertex_normals
 from realizer.facebuild.face_files import to_bytes
-from realizer.facebuild.hair.texture import hair_texture
+from realizer.facebuild.hair.cards import hair_texture
 from realizer.facebuild.parts import Part
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.lips import Lips

@@ -12,7 +12,7 @@ from realizer.face.basis import unpack
 from realizer.face.load import folder_of, load_face
 from realizer.face.mesh_geometry import part_triangles
 from realizer.facebuild.arkit.fields import ShapedSkin, shape_fields
-from realizer.facebuild.arkit.mouth_coordinates import mouth_of
+from realizer.facebuild.arkit.mouth import mouth_of
 from realizer.facebuild.mpeg4.defaults import split_sides
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.tables import faps
