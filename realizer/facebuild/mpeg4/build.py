@@ -181,17 +181,21 @@ def _softened(
 
 def with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
     """Return a row (n, k) with a field of the skin; what grows on the skin follows it, other parts stay."""
+    out = np.array(row)
+    out[slice(*parts["skin"])] = field
+    vertex, near, share = grown(at, parts)
+    out[vertex] = (field[near] * share[..., None]).sum(axis=1)
+    return out
+
+
+def grown(at: Float64, parts: Mapping[str, tuple[int, int]]) -> tuple[Any, Any, Float64]:
+    """Return vertices (k,) that grow on the skin, the skin's vertices (k, 3) they follow, and the shares.
+
+    The skin's vertices are counted from its first.
+    """
     from scipy.spatial import cKDTree
 
-    out, skin = np.array(row), slice(*parts["skin"])
-    out[skin] = field
-    if not set(GROWN) & set(parts):
-        return out
-    tree = cKDTree(at[skin])
-    for name in GROWN:
-        if name in parts:
-            mine = slice(*parts[name])
-            off, near = tree.query(at[mine], NEAR)
-            share = 1 / np.maximum(off, 1e-5)
-            out[mine] = (field[near] * (share / share.sum(axis=1, keepdims=True))[..., None]).sum(axis=1)
-    return out
+    vertex = np.concatenate([np.zeros(0, int), *(np.arange(*parts[name]) for name in GROWN if name in parts)])
+    off, near = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
+    share = 1 / np.maximum(off, 1e-5)
+    return vertex, near, share / np.maximum(share.sum(axis=1, keepdims=True), 1e-30)

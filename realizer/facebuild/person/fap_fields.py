@@ -79,18 +79,13 @@ def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:
     corners *= np.where(lips.fade > 0, lips.fade, ground.body & (ground.at[:, 2] > -0.05))
     fall = ground.point("2.1")[2] - pivot[2]
     rows[JAW_SIN + 1] -= BACKWARDS * fall * ground.smoothed(corners, 2)[:, None] * FORWARD
-    return rows | {
-        14: slides[:, None] * FORWARD,
-        15: -slides[:, None] * LEFT,
-    }
+    return rows | {14: slides[:, None] * FORWARD, 15: -slides[:, None] * LEFT}
 
 
 def _brows(ground: Ground) -> dict[int, Float64]:
     at, points = ground.at, ground.points
-    raise_ = sum(
-        (ground.shape(name) for name in ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")),
-        np.zeros_like(at),
-    )
+    names = ("browInnerUp", "browOuterUpLeft", "browOuterUpRight")
+    raise_ = sum(map(ground.shape, names), np.zeros_like(at))
     raise_ = np.where(ground.body[:, None], raise_, 0)
     stations = [ground.point(name) for name in ("4.1", "4.3", "4.5")]
     across = np.array([p[0] for p in stations])
@@ -102,10 +97,8 @@ def _brows(ground: Ground) -> dict[int, Float64]:
     profile[:, 0] = 0
     profile[:, 2] = np.clip(profile[:, 2], -0.6, 0.6)
     # The lid's edge does not follow the brow: FAPs 19 and 20 own it.
-    calm = 1 - np.maximum(
-        ground.ellipsoid(ground.point("3.1"), (0.024, 0.0095, 0.03), 0.5),
-        ground.ellipsoid(ground.point("3.2"), (0.024, 0.0095, 0.03), 0.5),
-    )
+    lids = (ground.ellipsoid(ground.point(name), (0.024, 0.0095, 0.03), 0.5) for name in ("3.1", "3.2"))
+    calm = 1 - np.maximum(*lids)
     profile = ground.smoothed(profile * calm[:, None], 2)
     out = {}
     for side, names, numbers in (

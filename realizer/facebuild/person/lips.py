@@ -58,12 +58,8 @@ def spline_basis(u: Any) -> Float64:
         value = np.eye(KNOTS)[knot]
         slope = np.gradient(value) * (1 - TENSION)
         slope[[0, -1]] *= (1 - END_TENSION) / (1 - TENSION)
-        out[knot] = (
-            basis[0] * value[piece]
-            + basis[1] * slope[piece]
-            + basis[2] * value[piece + 1]
-            + basis[3] * slope[piece + 1]
-        )
+        ends = (value[piece], slope[piece], value[piece + 1], slope[piece + 1])
+        out[knot] = sum(share * end for share, end in zip(basis, ends, strict=True))
     return out
 
 

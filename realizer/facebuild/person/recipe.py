@@ -2,7 +2,6 @@
 
 import difflib
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -14,7 +13,7 @@ from realizer.face.reading import face_errors
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.clothing import glasses_of
-from realizer.facebuild.person.sliders import description_of, person_faults, person_tables
+from realizer.facebuild.person.sliders import description_of, is_number, person_faults, person_tables
 from realizer.tables import toml_table
 
 COLOURS = (
@@ -114,7 +113,7 @@ def appearance_of(table: Mapping[str, Any]) -> Appearance:
     for key, value in table.items():
         if key not in names:
             raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
-        if not _number(value):
+        if not is_number(value):
             raise FaceError(f"look: {key}: wanted a number, got {value!r}")
     plain = toml_table("look.toml")
     return Appearance(**{name: float(table.get(name, plain[name])) for name in names})
@@ -145,7 +144,7 @@ def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
             near = difflib.get_close_matches(name, known, 1, 0.4)
             hint = f"; did you mean {near[0]!r}?" if near else ""
             faults.append(f"targets: {name}: no such shape target{hint}")
-        if not _number(weight) or not 0 <= weight <= 1:
+        if not is_number(weight) or not 0 <= weight <= 1:
             faults.append(f"targets: {name}: wanted a weight 0..1, got {weight!r}")
     return faults
 
@@ -156,14 +155,6 @@ def _colour_faults(colours: Mapping[str, Any]) -> list[str]:
     for name, colour in colours.items():
         if name not in COLOURS:
             faults.append(f"colours: {name}: wanted one of {', '.join(COLOURS)}")
-        elif (
-            not isinstance(colour, list)
-            or len(colour) != 3
-            or not all(_number(part) and 0 <= part <= 255 for part in colour)
-        ):
+        elif not isinstance(colour, list) or [is_number(c) and 0 <= c <= 255 for c in colour] != [True] * 3:
             faults.append(f"colours: {name}: wanted three numbers 0..255, got {colour!r}")
     return faults
-
-
-def _number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

@@ -42,12 +42,8 @@ class Scalp:
         self._axis = back[2] * 0.40
         high, lobe = points["10.1"], points["10.5"]
         tall = high[1] - lobe[1]
-        self._ear = (
-            (high[1] + lobe[1]) / 2 + EAR_ABOVE * tall,
-            high[2] - EAR_BEHIND * tall,
-            EAR_TALL * tall,
-            EAR_WIDE * tall,
-        )
+        middle = (high[1] + lobe[1]) / 2
+        self._ear = middle + EAR_ABOVE * tall, high[2] - EAR_BEHIND * tall, EAR_TALL * tall, EAR_WIDE * tall
         ways = self.at - self.middle
         away = np.linalg.norm(ways, axis=1)
         ways /= away[:, None]

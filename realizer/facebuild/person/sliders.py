@@ -41,7 +41,7 @@ def person_faults(person: Mapping[str, Any]) -> list[str]:
             faults += _people_faults(value)
         else:
             low, high = AGES if key == "age" else SHARES.get(key, (-1.0, 1.0))
-            if not _number(value) or not low <= value <= high:
+            if not is_number(value) or not low <= value <= high:
                 faults.append(f"person: {key}: wanted a number {low:g}..{high:g}, got {value!r}")
     return faults
 
@@ -71,7 +71,7 @@ def person_targets(person: Mapping[str, Any]) -> dict[str, float]:
 
 def description_of(person: Mapping[str, Any]) -> str:
     """Return a sentence about a person, for lists of faces; faulty sliders count as their defaults."""
-    told = {key: person[key] for key in ("age", "sex") if _number(person.get(key))}
+    told = {key: person[key] for key in ("age", "sex") if is_number(person.get(key))}
     age, sex = ({**DEFAULTS, **told}[key] for key in ("age", "sex"))
     word = "woman" if sex < 0.4 else "man" if sex > 0.6 else "person"
     return f"A {word} of about {age:g}"
@@ -81,7 +81,8 @@ def _table() -> dict[str, Any]:
     return toml_table("person.toml")
 
 
-def _number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Return whether a value of a recipe is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -93,7 +94,7 @@ def _people_faults(people: Any) -> list[str]:
     wanted = f"person: people: wanted shares above 0 of {', '.join(PEOPLES)}"
     if not isinstance(people, dict) or not people:
         return [f"{wanted}, got {people!r}"]
-    bad = {k: v for k, v in people.items() if k not in PEOPLES or not _number(v) or v < 0}
+    bad = {k: v for k, v in people.items() if k not in PEOPLES or not is_number(v) or v < 0}
     if bad or sum(people.values()) <= 0:
         return [f"{wanted}, got {bad or people!r}"]
     return []

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 ERROR = 0.006  # m, standard deviation of a landmark
-TILT = np.radians(
-    4
-)  # standard deviation of a head's pitch and roll beside the camera, and of a profile's turn
+# Standard deviation of a head's pitch and roll beside the camera, and of a profile's turn.
+TILT = np.radians(4)
 RULER = 0.001  # standard deviation of the size that irises tell: those of all people are about as large
 HUBER = 2.0  # standard deviations; what is further off counts less
 ROUNDS, STEP = 14, 0.05  # of Gauss and Newton; differences in standard deviations, radians and shares

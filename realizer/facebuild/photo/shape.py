@@ -18,10 +18,7 @@ from realizer.tables import csv_rows, toml_table
 DISTANCE = 1.5  # m from the camera to the head, as people are photographed; pictures do not tell it
 SPREAD = 0.2  # standard deviation of a slider
 # Of a person of whom nothing is known: mean, standard deviation, bounds. Weight and muscle change no head.
-LIKELY = {
-    "age": (42.0, 30.0, *AGES),
-    "sex": (0.5, 1.5, 0.0, 1.0),
-}
+LIKELY = {"age": (42.0, 30.0, *AGES), "sex": (0.5, 1.5, 0.0, 1.0)}
 PEOPLES = {"african": (-0.5, 2.0, -5.0, 4.0), "asian": (-0.5, 2.0, -5.0, 4.0)}  # logarithms beside caucasian
 
 
@@ -112,13 +109,8 @@ class Sliders:
 
     def person(self, values: Float64) -> dict[str, Any]:
         """Return the table [person] of a recipe for values (k,), in standard deviations from the mean."""
-        given = dict(
-            zip(
-                self.names,
-                (self._mean + self._spread * np.clip(values, self.low, self.high)).tolist(),
-                strict=True,
-            )
-        )
+        figures = self._mean + self._spread * np.clip(values, self.low, self.high)
+        given = dict(zip(self.names, figures.tolist(), strict=True))
         if "people" not in self._told:
             shares = {name: float(np.exp(given.pop(name))) for name in PEOPLES} | {"caucasian": 1.0}
             whole = sum(shares.values())

@@ -16,10 +16,8 @@ FACING = 0.12, 0.55  # cosines between skin and camera from which a picture coun
 CELL, HIDDEN = 3.0, 0.004  # pixels of the depth picture; m behind it from which on skin is hidden
 SAMPLE, ROUNDS = 20_000, 6  # texels that the light is measured at, and how often
 ALIKE = 0.25  # differences of logarithms that the light does not explain, a standard deviation
-ODD = (
-    0.55,
-    1.1,
-)  # such differences from which colours are not the skin's, and are certainly not: hair, shadows
+# Such differences from which colours are not the skin's, and are certainly not: hair, shadows.
+ODD = 0.55, 1.1
 LEAST = 0.15  # of the mean light; darker skin is left as dark as it is
 BROWS = ("4.1", "4.2", "4.3", "4.4", "4.5", "4.6")
 BROW, LIDS = (0.013, 0.0085, 0.03), 2  # half axes about a brow's points; rings of the lids that are left

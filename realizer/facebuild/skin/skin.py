@@ -163,11 +163,8 @@ class Skin:
         cheeks = self.around("5.3", "5.4", radii=(0.034, 0.030, 0.05), off=(-0.012, 0, 0.01))
         brow = self.around("9.12", radii=(0.045, 0.050, 0.05), off=(0, 0.035, 0))
         chin = self.around("2.10", radii=(0.022, 0.018, 0.03))
-        return (
-            self.float(np.clip(nose + 0.75 * cheeks + 0.4 * brow + 0.5 * chin, 0, 1))
-            * self.dry
-            * (1 - self.red)
-        )
+        pored = self.float(np.clip(nose + 0.75 * cheeks + 0.4 * brow + 0.5 * chin, 0, 1))
+        return pored * self.dry * (1 - self.red)
 
     def mark(self, name: str, mask: Any, number: int) -> Any:
         """Return texels (c,) in the middle of marks of the table, and radii (c,): small ones more often.

@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.features import read_features
 from realizer.face.load import load_folder
 from realizer.facebuild.mpeg4 import rigid
-from realizer.facebuild.mpeg4.build import GROWN, NEAR, setup_of
+from realizer.facebuild.mpeg4.build import grown, setup_of
 from realizer.facebuild.mpeg4.defaults import default_setup
 from realizer.facebuild.mpeg4.fap_limits import usual_range
 from realizer.facebuild.mpeg4.fields import WAYS, pairs
@@ -105,7 +104,7 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     vertex, near, share = grown(at, parts)
     arrays = {
         "vertices": face.vertices, "triangles": face.triangles.astype(np.uint32),
-        "grown": vertex, "near": near, "share": share,
+        "grown": vertex.astype(np.uint32), "near": near.astype(np.uint32) + parts["skin"][0], "share": share,
     }  # fmt: skip
     head["eyes"] = [
         {
@@ -117,18 +116,6 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         )
     ]  # fmt: skip
     return head, arrays
-
-
-def grown(at: Float64, parts: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-    """Return vertices (k,) that grow on the skin, the skin's vertices (k, 3) they follow, and the shares."""
-    from scipy.spatial import cKDTree
-
-    mine = [np.arange(*parts[name]) for name in GROWN if name in parts]
-    vertex = np.concatenate([*mine, np.zeros(0, int)]).astype(np.uint32)
-    off, near = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
-    share = 1 / np.maximum(off, 1e-5)
-    share = share / np.maximum(share.sum(axis=1, keepdims=True), 1e-30)
-    return vertex, near.astype(np.uint32) + parts["skin"][0], share
 
 
 @cache

@@ -13,7 +13,7 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.facebuild.check import check_face
-from realizer.facebuild.mpeg4.build import FILES, apply_zones, copy_with_zones, setup_of, with_brows
+from realizer.facebuild.mpeg4.build import FILES, apply_zones, copy_with_zones, grown, setup_of, with_brows
 from realizer.facebuild.mpeg4.faceeditor import write_faceeditor
 from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
 from realizer.facebuild.mpeg4.parameters import FILE, write_setup
@@ -151,3 +151,12 @@ def test_copy_with_zones_locates_missing_feature_points(tmp_path: Path) -> None:
     found = face_of(folder)
     assert set(guesses) < set(found.points)
     assert found.points["3.5"] == pytest.approx(load_face().points["3.5"], abs=0.005)
+
+
+def test_grown_vertices_follow_the_nearest_skin() -> None:
+    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.5]], float)
+    vertex, near, share = grown(at, {"skin": (0, 3), "brows": (3, 4)})
+    assert vertex.tolist() == [3]
+    assert near[0, 0] == 0
+    assert share.sum() == 1
+    assert len(grown(at, {"skin": (0, 4)})[0]) == 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from realizer.face.features import NAMES
 from realizer.face.load import folder_of
-from realizer.facebuild.studio.head_message import grown, head_message, packed, unpacked
+from realizer.facebuild.studio.head_message import head_message, packed, unpacked
 
 
 def test_packed_begins_arrays_where_its_json_says() -> None:
@@ -36,12 +36,3 @@ def test_head_message_has_points_zones_and_tables() -> None:
     assert head["keep"], "the face has shapes of its own"
     assert arrays["vertices"].shape[0] == max(last for _, last in head["parts"].values())
     json.dumps(head)
-
-
-def test_grown_vertices_follow_the_nearest_skin() -> None:
-    at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.5]], float)
-    vertex, near, share = grown(at, {"skin": (0, 3), "brows": (3, 4)})
-    assert vertex.tolist() == [3]
-    assert near[0, 0] == 0
-    assert share.sum() == 1
-    assert len(grown(at, {"skin": (0, 4)})[0]) == 0
