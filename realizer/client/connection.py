@@ -45,6 +45,9 @@ class PendingConnection:
             raise ClientError(text, "token" if status in (401, 403) else "connection") from None
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
+        except OSError as error:
+            error.add_note(f"wanted a service at {self._url}; `realizer serve` starts one")
+            raise
         self._client = Client(socket, self._url, lambda url: PendingConnection(url, self._token))
         token = {} if self._token is None else {"token": self._token}
         try:

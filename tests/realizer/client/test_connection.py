@@ -62,8 +62,9 @@ def test_connect_raises_os_error_where_nothing_listens() -> None:
     async def run() -> None:
         async with Server(Settings(port=0, voice="silent")) as server:
             url = server.url
-        with pytest.raises(OSError, match="Connect"):
+        with pytest.raises(OSError, match="Connect") as caught:
             async with connect(url):
                 pass
+        assert caught.value.__notes__ == [f"wanted a service at {url}; `realizer serve` starts one"]
 
     asyncio.run(run())
