@@ -15,8 +15,7 @@ from bml_schema.node_schema import attribute, node
 from bml_schema.nodes import Behaviour
 from bml_schema.values import one_of
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import BehaviourKind
-from realizer.behaviours.kind import timing_from_table
+from realizer.behaviours.kind import BehaviourKind, timing_from_table
 from realizer.face.load import folder_of
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output
