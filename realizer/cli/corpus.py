@@ -139,15 +139,37 @@ def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, 
 
 @corpus.command()
 @folder
-@click.argument("name")
+@click.argument("name", required=False)
 @option("--annotator", "Whose labels to add or remove.", default="me")
 @option("--add START END EXPRESSION", "Seconds.", SEGMENT, name="added", multiple=True)
 @option("--remove START END EXPRESSION", type=SEGMENT, name="removed", multiple=True)
-def label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans) -> None:
+@click.option("--page", is_flag=True, help="Label in the browser; prints the page's address.")
+@click.option("--port", default=0, help="Port of the page.  [default: a free one]")
+@click.option("--browser/--no-browser", default=True, help="Open the page in the browser.")
+def label(folder: Path, name: str | None, annotator: str, **chosen: Any) -> None:
     """Add or remove segments of a recording NAME, and print them with the agreement of annotators.
 
-    Segments of other programs come in by `realizer corpus add`, and go out by `realizer corpus export`.
+    With --page, serve the page's tab Label on this machine until Ctrl-C: film, sound and words, and a lane of
+    labels for each annotator. It needs no NAME. Segments of other programs come in by `realizer corpus add`,
+    and go out by `realizer corpus export`.
     """
+    import asyncio
+
+    from realizer.cli.edit_face import serve_tab
+    from realizer.core.settings import Settings
+
+    _check_corpus(folder)
+    if chosen["page"]:
+        settings = Settings.read({"host": "127.0.0.1", "port": chosen["port"], "corpus": folder})
+        asyncio.run(serve_tab(settings, "label", chosen["browser"]))
+    elif name is None:
+        raise click.UsageError(f"{folder}: wanted the NAME of a recording, or --page")
+    else:
+        _label(folder, name, annotator, chosen["added"], chosen["removed"])
+
+
+def _label(folder: Path, name: str, annotator: str, added: Spans, removed: Spans) -> None:
+    """Change and print the labels of a recording."""
     from realizer.corpus.agreement import agreement
     from realizer.corpus.recording import CorpusError, change, read_recording, write_recording
 

@@ -48,10 +48,12 @@ def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
         shutil.copytree(source, copy)
     os.environ[VARIABLE] = str(copy.parent)
     settings = Settings.read({"host": "127.0.0.1", "port": port, "face": copy.name, "edit": folder})
-    asyncio.run(_serve(settings, copy, browser))
+    click.echo(f"{copy}: the copy that is edited")
+    asyncio.run(serve_tab(settings, "face", browser))
 
 
-async def _serve(settings: Settings, copy: Path, browser: bool) -> None:
+async def serve_tab(settings: Settings, tab: str, browser: bool) -> None:
+    """Serve the page, and show a tab of it, until the command is stopped."""
     import signal
     import webbrowser
 
@@ -60,8 +62,8 @@ async def _serve(settings: Settings, copy: Path, browser: bool) -> None:
     ending = wait_for_signal(signal.SIGINT, signal.SIGTERM)
 
     async with Server(settings) as server:
-        click.echo(f"{copy}: the copy that is edited")
-        click.echo(f"page: {server.page}#face")
+        address = f"{server.page}#{tab}"
+        click.echo(f"page: {address}")
         if browser:
-            webbrowser.open(f"{server.page}#face")
+            webbrowser.open(address)
         await ending

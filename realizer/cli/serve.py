@@ -89,6 +89,7 @@ def _served_face(value: str | None) -> str | None:
 @options.media
 @options.expressions
 @setting_option("edit", "DIR", type=click.Path(path_type=Path))
+@setting_option("corpus", "DIR", type=click.Path(path_type=Path))
 @setting_option("seed", "N")
 @option("--idle/--no-idle", "Blinks and small head motion of an idle face.", default=None)
 @options.motion_options

@@ -196,6 +196,9 @@ class Settings:
         "folder in which clients may save expressions, in DIR/expressions, which are then played too; none: "
         "they save nothing",
     )
+    corpus: Path | None = _row(
+        None, kind.folder, "corpus whose recordings clients may label in the page; none: they label nothing"
+    )
     seed: int = _row(0, kind.whole(-(2**63), 2**63 - 1), "seed of idle motion")
     idle: bool = _row(True, kind.flag, "blinks and small head motion")
     liveliness: float = _row(

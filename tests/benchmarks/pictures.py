@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -13,7 +14,6 @@ import realizer
 from realizer.examples import examples
 from realizer.outputs.output import RenderSettings
 from realizer.render.light import presets
-from tests.benchmarks import curve_pictures
 
 ROOT = Path(__file__).parents[2]
 EMOTIONS = "ada JOY, ben SURPRISE, ida SADNESS, leo ANGER, nia DISGUST, omar FEAR"
@@ -149,6 +149,59 @@ def designer(path: Path, theme: str = "light", size: tuple[int, int] = (1440, 90
     Image.open(path).convert("RGB").save(path, optimize=True)
 
 
+ROOMS = {"desktop": ((1440, 900), "light"), "tablet": ((820, 1180), "dark")}
+
+
+def labels(folder: Path, corpus: Path) -> None:
+    """The tab Label with the recording `anna` of a corpus, as label-desktop.webp and label-tablet.webp."""
+    from playwright.sync_api import sync_playwright
+
+    from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, serving
+
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle", "--corpus", str(corpus)]
+    with serving(command) as address, sync_playwright() as playwright, TemporaryDirectory() as place:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        for name, ((width, height), scheme) in ROOMS.items():
+            size = {"width": width, "height": height}
+            opened = browser.new_page(viewport=size, bypass_csp=True, color_scheme=scheme)
+            opened.set_default_timeout(PATIENCE)
+            opened.add_init_script("localStorage.setItem('annotator', 'tom')")
+            opened.goto(f"{address}#label")
+            opened.wait_for_selector("#label-agreement td")
+            opened.click("#label-score .d-block")
+            opened.evaluate("realizerPage.label.look(1); scrollTo(0, 0)")
+            opened.wait_for_timeout(2000)
+            opened.screenshot(path=Path(place, "room.png"))
+            with Image.open(Path(place, "room.png")) as picture:
+                picture.convert("RGB").save(folder / f"label-{name}.webp", quality=88)
+            opened.close()
+
+
+def corpus(folder: Path) -> Path:
+    """A corpus with a film of somebody who speaks, and the labels of two people."""
+    from realizer.corpus.recording import Annotation, Recording, write_recording
+
+    (folder / "anna").mkdir()
+    (folder / "corpus.toml").write_text("version = 1\n")
+    bml = (
+        '<bml id="b"><speech id="s"><text>Are you really sure about that?</text></speech>'
+        '<faceFacs id="a" au="2" amount="1" start="0.4" end="1.6"/>'
+        '<faceFacs id="d" au="12" amount="1" start="1.8" end="3.2"/></bml>'
+    )
+    played = realizer.realize(bml, face="ida", fps=12.5)
+    played.save(folder / "anna" / "film.webm", size=(320, 320))
+    names = ("Are", "you", "really", "sure", "about", "that?")
+    words = [Annotation(0.27 * k, 0.27 * (k + 1), word, "anna") for k, word in enumerate(names)]
+    rows = {
+        "eva": [(0.4, 1.6, "surprise"), (1.84, 3.2, "happiness")],
+        "tom": [(0.52, 1.48, "surprise"), (1.2, 1.92, "disbelief"), (1.92, 3.0, "happiness")],
+    }
+    labels = [Annotation(start, end, text, who) for who, spans in rows.items() for start, end, text in spans]
+    meta = {"person": "anna", "fps": 25.0, "frames": 2 * played.frames}
+    write_recording(folder / "anna", Recording("anna", meta, tuple(labels), tuple(words)))
+    return folder
+
+
 if __name__ == "__main__":
     os.environ["REALIZER_DRAW"] = "onboard"
     sheet = realizer.realize(examples()["greeting"]).save(ROOT / "realizer/examples/greeting.png")
@@ -160,4 +213,5 @@ if __name__ == "__main__":
     film(ROOT / "docs" / "film-after.jpg")
     page(ROOT / "realizer/examples/page.png")
     designer(ROOT / "docs" / "design.png")
-    curve_pictures.main()
+    with TemporaryDirectory() as place:
+        labels(ROOT / "docs", corpus(Path(place)))

@@ -1,8 +1,6 @@
 """What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
 
-import json
 import re
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -11,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.errors import FaceError
 from realizer.face.features import read_features
 from realizer.face.load import load_folder
 from realizer.facebuild.mpeg4 import rigid
@@ -25,52 +22,12 @@ from realizer.facebuild.mpeg4.zones import mirrorable
 from realizer.tables import csv_rows, faps
 
 FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # what a face's name has not
-ALIGN = 8  # bytes; arrays begin at a multiple of it
 
 
 @dataclass(frozen=True)
 class _PointName:
     name: str
     says: str
-
-
-def packed(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
-    """Return JSON and arrays as one message: the length of the JSON (u32), the JSON, and the arrays.
-
-    `arrays` of the JSON has the name, the type as numpy's and the offset from the message's start of each.
-    """
-    rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    listed = {name: [array.dtype.str[1:], array.size, 0] for name, array in rows.items()}
-    room = len(json.dumps({**header, "arrays": listed})) + 12 * len(rows) + 4
-    at = -(-room // ALIGN) * ALIGN
-    start = at
-    for name, array in rows.items():
-        listed[name][2] = at
-        at += -(-array.nbytes // ALIGN) * ALIGN
-    text = json.dumps({**header, "arrays": listed}).ljust(start - 4).encode()
-    body = b"".join(
-        array.tobytes().ljust(-(-array.nbytes // ALIGN) * ALIGN, b"\0") for array in rows.values()
-    )
-    return len(text).to_bytes(4, "little") + text + body
-
-
-def unpacked(message: str | bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON of a message of the page, and the bytes behind it.
-
-    Raises:
-        FaceError: it is no such message.
-    """
-    try:
-        if isinstance(message, str):
-            asked, payload = json.loads(message), b""
-        else:
-            (length,) = struct.unpack_from("<I", message)
-            asked, payload = json.loads(message[4 : 4 + length]), message[4 + length :]
-    except (ValueError, struct.error) as error:
-        raise FaceError(f"wanted JSON, or a length, JSON and bytes: {error}") from None
-    if not isinstance(asked, dict):
-        raise FaceError(f"wanted a JSON object, got {str(asked)[:80]!r}")
-    return asked, payload
 
 
 def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -27,8 +27,9 @@ from realizer.facebuild.mpeg4.landmarks import PUPILS, TEETH
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup, setup_from, setup_table, write_setup
 from realizer.facebuild.mpeg4.zones import Setup
 from realizer.facebuild.studio.bare_head import import_bare
-from realizer.facebuild.studio.head_message import FACE_NAME, head_message, packed, unpacked
+from realizer.facebuild.studio.head_message import FACE_NAME, head_message
 from realizer.server.edits.edit_folder import LOCK, NAME
+from realizer.server.edits.packed_messages import packed, unpacked
 from realizer.server.http.face_glb import face_glb
 
 FACES = "faces"  # in the folder of the setting `edit`

@@ -25,6 +25,7 @@ class Capabilities(Reply):
     cameras: list[str] = Field([], description="names of cameras for `subscribe`")
     lights: list[str] = Field([], description="names of lights for `subscribe`")
     edit: bool = Field(False, description="whether this connection may `save`")
+    corpus: bool = Field(False, description="whether there is a corpus whose recordings can be labelled")
 
 
 class Limits(Reply):

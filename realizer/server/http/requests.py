@@ -76,7 +76,7 @@ def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
 
 log = logging.getLogger(__name__)
 
-SOCKETS = ("/ws", "/check", "/studio")  # paths of WebSockets
+SOCKETS = ("/ws", "/check", "/studio", "/label")  # paths of WebSockets
 
 
 class HttpRequests:

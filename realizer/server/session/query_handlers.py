@@ -115,6 +115,7 @@ def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mappin
             streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
             pictures=list(PICTURES),
             fps=s.fps,
+            corpus=s.corpus is not None,
             # Those of a folder may have changed since the service began.
             **{
                 **capabilities,

@@ -55,6 +55,14 @@ def test_corpus_goes_from_recordings_to_rules(tmp_path: Path) -> None:
     assert run("corpus", "describe", folder, "--annotator", "eva").exit_code == 0  # with the report in it
 
 
+def test_corpus_label_wants_a_recording_or_the_page(tmp_path: Path) -> None:
+    run("corpus", "init", tmp_path / "c")
+    said = run("corpus", "label", tmp_path / "c")
+    assert said.exit_code == 2
+    assert "wanted the NAME of a recording, or --page" in said.stderr
+    assert "wanted a corpus" in run("corpus", "label", tmp_path, "--page").stderr
+
+
 def test_corpus_exports_labels(tmp_path: Path) -> None:
     run("corpus", "init", tmp_path / "c")
     write_recording(tmp_path / "c" / "one", acted(1, 500))

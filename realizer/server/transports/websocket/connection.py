@@ -6,6 +6,7 @@ import http
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import lru_cache
+from importlib import import_module
 from typing import Protocol
 
 from websockets.asyncio.server import ServerConnection
@@ -27,6 +28,7 @@ from realizer.server.transports.websocket.protocol import Connection
 log = logging.getLogger(__name__)
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
+LABELLING = "realizer.corpus.labelling"  # imported by name: that package builds on this one
 REASON = 123  # bytes of a reason in a close frame
 
 
@@ -69,6 +71,7 @@ class WebSocketConnections:
         self._work: dict[str, Callable[[ClientSocket], Awaitable[None]]] = {
             "/check": self._check,
             "/studio": self._edit,
+            "/label": self._edit,
         }
         self._checking, self._editing = asyncio.Lock(), asyncio.Lock()
         self._from: list[str] = []  # the addresses of the open connections
@@ -201,20 +204,23 @@ class WebSocketConnections:
             await client.send_all(found)
 
     async def _edit(self, client: ClientSocket) -> None:
-        """Serve the WebSocket of a page that edits a face: answer its messages in their order."""
+        """Serve the WebSocket of a page that edits a face or labels: answer its messages in their order."""
         from realizer.face.load import face_tool
 
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
-        studio = face_tool("Studio")(self._settings.edit if may_save else None)
+        if path_of(client.target) == "/label":
+            tool = import_module(LABELLING).Labelling(self._settings.corpus, may_save=may_save)
+        else:
+            tool = face_tool("Studio")(self._settings.edit if may_save else None)
         loop = asyncio.get_running_loop()
         try:
             while (message := await client.receive()) is not None:
                 async with self._editing:  # one at a time for all pages, because each may take seconds
-                    answer = await loop.run_in_executor(None, studio.answer, message)
+                    answer = await loop.run_in_executor(None, tool.answer, message)
                 await client.send_all(answer)
         finally:
-            await loop.run_in_executor(None, studio.close)
+            await loop.run_in_executor(None, tool.close)
 
 
 class WebSocketClient:

@@ -4,6 +4,7 @@ import { DesignTab } from "./design/tab.js";
 import { at, choose, make, tabs } from "./dom.js";
 import { Editor } from "./editor.js";
 import { FaceRoom } from "./face/room.js";
+import { LabelTab } from "./label/tab.js";
 import { Log } from "./log.js";
 import { Mirror } from "./mirror.js";
 import { download, Pose } from "./pose.js";
@@ -37,6 +38,7 @@ const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
 const mirror = new Mirror(link, (message) => log.error(message));
 const room = new FaceRoom();
 const design = new DesignTab(link, stage);
+const label = new LabelTab(async (find) => (await design.ask({ tool: "library", find })).expressions);
 const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
@@ -74,6 +76,7 @@ link.onfeedback = (element, seq) => {
 link.onreply = (message) => {
   mirror.reply(message);
   design.reply(message);
+  label.reply(message);
   if (message.type === "gap") log.last = 0;
   if (message.type === "welcome") faces = message.capabilities.faces ?? [];
   if (message.type === "state") showVoice(message.characters[0]?.voice ?? message.voice.name);
@@ -173,6 +176,7 @@ function draw() {
     recorder.draw();
     at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;
   }
+  label.draw();
   timeline.draw(now);
   requestAnimationFrame(draw);
 }
@@ -290,10 +294,11 @@ at("record").onclick = async () => {
 // the pose ------------------------------------------------------------------------------------
 
 tabs(at("tabs"), (tab) => {
-  at("pose").hidden = ["tab-script", "tab-mirror", "tab-face", "tab-design"].includes(tab);
+  at("pose").hidden = ["tab-script", "tab-mirror", "tab-face", "tab-design", "tab-label"].includes(tab);
   at("face-stage").hidden = tab !== "tab-face";
   room.turn(tab === "tab-face", faces, face?.name);
   design.show(tab === "tab-design");
+  label.turn(tab === "tab-label");
 });
 pose.addEventListener("change", () => {
   const parts = [pose.emotion && "an emotion", pose.aus.size && `${pose.aus.size} AU${pose.aus.size > 1 ? "s" : ""}`, pose.faps.size && `${pose.faps.size} FAP${pose.faps.size > 1 ? "s" : ""}`];
@@ -354,4 +359,4 @@ link.connect();
 requestAnimationFrame(draw);
 
 // For tests of the page: what has been shown.
-globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room, mirror, design };
+globalThis.realizerPage = { stage, sound, link, clock, editor, timeline, pose, recorder, room, mirror, design, label };

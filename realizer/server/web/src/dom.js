@@ -46,11 +46,12 @@ export function tabs(strip, shown) {
   for (const tab of all) tab.onclick = () => show(tab);
   strip.onkeydown = (event) => {
     const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-    const next = event.key === "Home" ? 0 : event.key === "End" ? all.length - 1 : step && (all.indexOf(document.activeElement) + step + all.length) % all.length;
+    const here = all.filter(({ hidden }) => !hidden);
+    const next = event.key === "Home" ? 0 : event.key === "End" ? here.length - 1 : step && (here.indexOf(document.activeElement) + step + here.length) % here.length;
     if (next === undefined) return;
     event.preventDefault();
-    all[next].focus();
-    show(all[next]);
+    here[next].focus();
+    show(here[next]);
   };
   const named = () => all.find((tab) => location.hash === `#${tab.getAttribute("aria-controls")}`) ?? all[0];
   addEventListener("hashchange", () => show(named()));

@@ -8,24 +8,7 @@ import numpy as np
 
 from realizer.face.features import NAMES
 from realizer.face.load import folder_of
-from realizer.facebuild.studio.head_message import head_message, packed, unpacked
-
-
-def test_packed_begins_arrays_where_its_json_says() -> None:
-    arrays = {"a": np.arange(3, dtype=np.float32), "b": np.arange(5, dtype=np.float64)}
-    message = packed({"id": 1}, arrays)
-    length = int.from_bytes(message[:4], "little")
-    header = json.loads(message[4 : 4 + length])
-    assert header["id"] == 1
-    for name, array in arrays.items():
-        kind, count, start = header["arrays"][name]
-        assert start % 8 == 0
-        assert (np.frombuffer(message, f"<{kind}", count, start) == array).all()
-
-
-def test_unpacked_is_the_json_and_the_bytes_behind_it() -> None:
-    assert unpacked('{"type": "open"}') == ({"type": "open"}, b"")
-    assert unpacked(b"\2\0\0\0{}mesh") == ({}, b"mesh")
+from realizer.facebuild.studio.head_message import head_message
 
 
 def test_head_message_has_points_zones_and_tables() -> None:

@@ -1,7 +1,6 @@
 // What mouse, touch and keys do to the blocks of the designer's lanes.
 import { ms } from "./model.js";
 
-export const FRAME = 0.04; // s
 const SNAP = 7; // px
 const TALL = 44; // px over which the amount of a block goes from 0 to 1
 const LEAST = 0.04; // s of an onset and an offset
@@ -91,13 +90,13 @@ export class Gestures {
     const way = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: -1, ArrowDown: 1 }[event.key];
     const across = /Left|Right/.test(event.key);
     const { start, end } = design.span(entry);
-    if (way && event.shiftKey && across) design.place(entry, lane, ms(Math.max(0, start + way * FRAME)));
+    if (way && event.shiftKey && across) design.place(entry, lane, ms(Math.max(0, start + way * design.frame)));
     else if (way && event.shiftKey) {
       const to = lane + way;
       if (to < 0) return;
       if (to >= design.shown.channel.length) design.addLane();
       design.place(entry, to, start);
-    } else if (way && (event.ctrlKey || event.metaKey) && across) this.resize(entry, end - start + way * FRAME, event.altKey, null);
+    } else if (way && (event.ctrlKey || event.metaKey) && across) this.resize(entry, end - start + way * design.frame, event.altKey, null);
     else if (way && across) this.choose(design.blocks(design.shown.channel[lane]).map((one) => one.entry), entry, way);
     else if (way) this.jump(lane, way, (start + end) / 2);
     else if (event.key === "+" || event.key === "=" || event.key === "-") design.change(entry, { intensity: ms(Math.min(1, Math.max(0, (entry.intensity ?? 1) + (event.key === "-" ? -0.05 : 0.05)))) });

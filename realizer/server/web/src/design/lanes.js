@@ -1,6 +1,6 @@
 // The lanes of the designer: blocks with handles, by mouse, touch and keyboard; words and sound of a speech above.
 import { make } from "../dom.js";
-import { FRAME, Gestures } from "./gestures.js";
+import { Gestures } from "./gestures.js";
 import { isBreak, ms, titleOf } from "./model.js";
 
 const HANDLES = { start: "start", onset: "end of the onset", offset: "begin of the offset", end: "end", amount: "amount" };
@@ -21,10 +21,10 @@ export class Lanes extends Gestures {
     design.addEventListener("select", () => this.mark());
     this.lanes.onpointerdown = (event) => this.grab(event);
     this.lanes.onkeydown = (event) => this.key(event);
-    this.lanes.onfocusin = ({ target }) => target.entry && target.entry !== design.selected && design.select(target.entry);
+    this.lanes.addEventListener("focusin", ({ target }) => target.entry && target.entry !== design.selected && design.find(target.entry) && design.select(target.entry));
     this.ruler.onpointerdown = (event) => this.rule(event);
     this.ruler.onkeydown = (event) => {
-      const step = { ArrowLeft: -FRAME, ArrowRight: FRAME, PageUp: -1, PageDown: 1, Home: -Infinity }[event.key];
+      const step = { ArrowLeft: -design.frame, ArrowRight: design.frame, PageUp: -1, PageDown: 1, Home: -Infinity }[event.key];
       if (!step) return;
       event.preventDefault();
       scrub(Math.max(0, this.time + step));
@@ -173,7 +173,10 @@ export class Lanes extends Gestures {
 
   // Seconds, words and sound above the lanes.
   drawRuler() {
-    const { words, peaks } = this.design.speech;
+    const { words, peaks, rate = 100 } = this.design.speech;
+    const known = [words, peaks, this.scale, this.reach];
+    if (known.every((one, k) => one === this.ruled?.[k])) return;
+    this.ruled = known;
     const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60].find((s) => s * this.scale >= 56) ?? 300;
     const placed = (what, at, text) => {
       const mark = make(what, { title: text }, text);
@@ -190,7 +193,7 @@ export class Lanes extends Gestures {
     const pen = wave.getContext("2d");
     pen.fillStyle = getComputedStyle(this.panel).getPropertyValue("--curve");
     peaks.forEach((peak, k) => pen.fillRect(k, 12 - 12 * peak, 1, Math.max(1, 24 * peak)));
-    wave.style.setProperty("--long", peaks.length / 100);
+    wave.style.setProperty("--long", peaks.length / rate);
     this.ruler.classList.toggle("spoken", words.length > 0);
     this.ruler.replaceChildren(wave, ...marks, ...said);
   }

@@ -5,7 +5,7 @@ const BREAK = 0.5; // s, the usual break
 const DRAFT = "design"; // in localStorage
 
 export const ms = (seconds) => Math.round(seconds * 1000) / 1000;
-export const isBreak = ({ expression }) => expression.trim().toUpperCase() === "NEUTRAL";
+export const isBreak = ({ expression, start }) => start === undefined && expression.trim().toUpperCase() === "NEUTRAL";
 export const keyOf = (name) => name.trim().replace(/\s*:\s*/g, ":").replace(/[\s_-]+/g, "_").toUpperCase();
 const empty = () => ({ timeline: { channel: [{ name: "1", entries: [] }] }, speech: { text: "", words: [], peaks: [] } });
 
@@ -17,6 +17,7 @@ export class Design extends EventTarget {
   selected = null; // an entry
   lane = 0; // number of the channel that new blocks go to
   preview = null; // the state during a gesture
+  frame = 0.04; // s, a step of the arrow keys
   state = empty();
 
   get shown() {

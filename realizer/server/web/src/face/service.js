@@ -1,12 +1,13 @@
-// The questions of the Face tab to the service, over a WebSocket of their own.
+// The questions of a tab to the service, over a WebSocket of their own: the Face tab's at studio.
 import { token } from "../service.js";
 
 const AGAIN = 1500; // ms
 const TYPES = { f4: Float32Array, f8: Float64Array, u4: Uint32Array, u1: Uint8Array };
 
 export class StudioService extends EventTarget {
-  constructor() {
+  constructor(path = "studio") {
     super();
+    this.path = path;
     this.waiting = new Map();
     this.number = 0;
     this.head = null; // what is opened again on a new connection: [question, bytes]
@@ -14,7 +15,7 @@ export class StudioService extends EventTarget {
 
   connect() {
     if (this.socket) return;
-    const address = new URL("studio", location.href.replace(/^http/, "ws"));
+    const address = new URL(this.path, location.href.replace(/^http/, "ws"));
     address.search = token ? `?token=${encodeURIComponent(token)}` : "";
     address.hash = "";
     this.socket = Object.assign(new WebSocket(address), { binaryType: "arraybuffer" });
