@@ -454,3 +454,16 @@ def test_page_passes_its_token_on(browser) -> None:  # type: ignore[no-untyped-d
         page.wait_for_load_state("networkidle")
         page.close()
     assert faults == []
+
+
+def test_page_asks_again_for_what_a_busy_service_did_not_send(browser, address) -> None:  # type: ignore[no-untyped-def]
+    page = browser.new_page(bypass_csp=True)
+    page.set_default_timeout(PATIENCE)
+    for path in ("**/faces/*", "**/examples.json"):
+        page.route(path, lambda route: route.abort(), times=1)
+    page.goto(address)
+    page.wait_for_function("document.getElementById('stage-note').textContent.includes('trying again')")
+    page.wait_for_selector("#lights button")
+    assert page.inner_text("#stage-note") == ""
+    page.wait_for_selector("#gallery button")
+    page.close()

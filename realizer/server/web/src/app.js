@@ -20,6 +20,7 @@ import { Wheel } from "./wheel.js";
 const MESH_RATE = 30; // frames a second; the page draws between them
 const CURVE_RATE = 25; // frames a second
 const AHEAD = 0.2; // s; curves are sent so long before their time
+const AGAIN = 3000; // ms until what a busy service did not send is asked for again
 const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
 const THEMES = { "": "as the system", light: "light", dark: "dark" };
 
@@ -145,7 +146,9 @@ async function showFace(message) {
     design.begin();
   } catch (error) {
     face = null;
-    at("stage-note").textContent = `The face could not be shown: ${error.message}`;
+    const again = !/: 4\d\d$/.test(error.message); // there is such a face, but the service is busy
+    at("stage-note").textContent = `The face could not be shown: ${error.message}${again ? "; trying again" : ""}`;
+    if (again) setTimeout(() => face === null && link.open && showFace(message), AGAIN);
   }
 }
 
@@ -353,8 +356,18 @@ async function vocabulary() {
   }
 }
 
+// Load what the page needs, again and again if the service does not answer; the first time that is reported.
+async function insist(what, load, told = false) {
+  try {
+    await load();
+  } catch (error) {
+    if (!told) log.error(`${what}: ${error.message}; trying again`);
+    setTimeout(() => insist(what, load, true), AGAIN);
+  }
+}
+
 status("connecting", "Connecting");
-for (const [what, load] of Object.entries({ examples, vocabulary })) load().catch((error) => log.error(`${what}: ${error.message}`));
+for (const [what, load] of Object.entries({ examples, vocabulary })) insist(what, load);
 link.connect();
 requestAnimationFrame(draw);
 
