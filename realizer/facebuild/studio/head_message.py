@@ -1,7 +1,6 @@
 """What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
 
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
-
 from realizer.face.features import NAMES
 from realizer.face.load import folder_of
 from realizer.facebuild.studio.head_message import head_message
