@@ -52,6 +52,8 @@ def unknown_word(attribute: str, word: str, known: Iterable[str]) -> Fault:
     family, _, part = got.upper().rpartition(":")
     parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
     near = difflib.get_close_matches(part, list(parts), n=3)
+    if not near and len(part) > 2:  # HAPPINESS for HAPPY
+        near = [name for name in parts if name.startswith(part[:3])][:3]
     suggestions = " or ".join(names[parts[name]] for name in near)
     hint = f", did you mean {suggestions}?" if near else ""
     wanted = f"{attribute}: wanted one of {', '.join(names.values())}"

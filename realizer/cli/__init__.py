@@ -1,5 +1,6 @@
 """The command line interface."""
 
+import errno
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -85,9 +86,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         # A TableError is in a file of the user: rules, a mapping, words.
         sys.exit(2 if isinstance(error, TableError | UnknownNameError) else 3)
     except OSError as error:
-        click.echo(
-            f"realizer: {error.filename or ''}: {error.strerror or error}".replace(" : ", " "), err=True
-        )
+        advice = "; choose another one with --port" if error.errno == errno.EADDRINUSE else ""
+        words = f"realizer: {error.filename or ''}: {error.strerror or error}{advice}"
+        click.echo(words.replace(" : ", " "), err=True)
         sys.exit(3)
 
 

@@ -191,7 +191,7 @@ class Heard(Message):
 
 
 class Track(Message):
-    """Let the face in pictures of this connection drive a character, as in a mirror.
+    """Drive a character by the face in pictures of this connection, as in a mirror.
 
     Pictures follow as binary messages: the header with kind 3, version 1 and a number of their own, then a
     JPEG, PNG or WebP file. Each one is answered by `tracked`, but for those that come while another one is

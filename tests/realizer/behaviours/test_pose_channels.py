@@ -56,6 +56,11 @@ def test_unknown_word_suggests_names_of_the_same_family() -> None:
     assert fault.text.endswith("got 'template:greif', did you mean template:grief?")
 
 
+def test_unknown_word_suggests_names_that_begin_alike() -> None:
+    assert unknown_word("lexeme", "HAPPY", ["ANGER", "HAPPINESS"]).text.endswith("did you mean HAPPINESS?")
+    assert "did you mean" not in unknown_word("lexeme", "NO", ["NOD_OFTEN_AND_LONG"]).text
+
+
 def test_unknown_word_cuts_a_long_one() -> None:
     assert unknown_word("name", "x" * 99, ["nod"]).text.endswith(f"got '{'x' * 60}...'")
 
