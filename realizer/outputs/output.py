@@ -1,18 +1,23 @@
 """The type of outputs: suffix, media type, and the function that encodes a realization."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from realizer.core.array_types import UInt8
 from realizer.core.atomic_files import write_bytes
 from realizer.core.errors import PluginError, RealizerError
-from realizer.face.model import Face
-from realizer.realization import Realization
-from realizer.render.renderer import Renderer
+
+# A package with a behaviour and an output is imported while the modules of a realization are.
+if TYPE_CHECKING:
+    from realizer.face.model import Face
+    from realizer.realization import Realization
+    from realizer.render.renderer import Renderer
 
 MORPHS = ("fap", "arkit")
 # Setting -> the only suffix that it is for, and the reason.

@@ -1,12 +1,18 @@
 """Times of words, phonemes and sync points of a realization, on one clock."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from realizer.animation.lips.visemes import sounds
-from realizer.playback.scheduled_speech import ScheduledSpeech
-from realizer.realization import Realization
-from realizer.speech.utterance import Phoneme, Word
+
+# As in realizer.outputs.output: plug-ins import this while the modules of a realization are imported.
+if TYPE_CHECKING:
+    from realizer.playback.scheduled_speech import ScheduledSpeech
+    from realizer.realization import Realization
+    from realizer.speech.utterance import Phoneme, Word
 
 MIN_LENGTH = 0.001  # s; shorter spans are rounding errors
 

@@ -9,10 +9,9 @@ import pytest
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fap_scores import FapScore, mean_score, score_faps
+from tests.benchmarks.face import PEERS
 from tests.shipped import DEFAULT, FACES
 
-# The scores of other faces (Paul 2010, tables 4.5), with FAPs that they lack counted as 0.
-PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}
 pytestmark = pytest.mark.xdist_group("scores")
 
 FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
