@@ -103,6 +103,7 @@ def picture(page) -> np.ndarray:  # type: ignore[no-untyped-def]
     return np.asarray(shot.convert("RGB"), np.int16)
 
 
+@pytest.mark.long
 def test_bml_face_moves_the_mouth_of_our_own_face(show) -> None:  # type: ignore[no-untyped-def]
     page = loaded(show("ada.glb"))
     assert len(page.evaluate("face.avatar.shapes")) == 52

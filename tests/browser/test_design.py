@@ -230,6 +230,7 @@ def test_design_does_everything_by_keyboard(page) -> None:  # type: ignore[no-un
     assert page.get_attribute(".d-ruler", "aria-valuenow") == "1.00"
 
 
+@pytest.mark.long
 def test_design_undoes_and_redoes_without_end(page) -> None:  # type: ignore[no-untyped-def]
     add(page, "surprise")
     page.focus(".d-block")
