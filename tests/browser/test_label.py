@@ -37,7 +37,9 @@ def corpus(tmp_path_factory) -> Path:  # type: ignore[no-untyped-def]
     places = (
         np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) * np.linspace(1, 2, 50)[:, None, None]
     )
-    write_recording(folder / "ben", Recording("ben", points=(tuple(map(str, range(12))), places)))
+    write_recording(
+        folder / "ben", Recording("ben", {"fps": 20.0}, points=(tuple(map(str, range(12))), places))
+    )
     (folder / "cora").mkdir()
     (folder / "cora" / "labels.csv").write_text("start,end,expression,annotator\n")
     return folder
@@ -222,8 +224,10 @@ def test_label_draws_points_where_there_is_no_film(page) -> None:  # type: ignor
     page.focus("#label-score .d-ruler")
     press(page, "PageDown")
     page.wait_for_function("realizerPage.label.film.time === 1")
-    page.wait_for_function("realizerPage.label.film.shown.startsWith('25 ')")
+    page.wait_for_function("realizerPage.label.film.shown.startsWith('20 ')")
     assert page.locator("#label-points").screenshot() != first
+    press(page, "ArrowRight")
+    assert page.evaluate("realizerPage.label.film.time") == pytest.approx(1.05), "a frame further"
 
 
 def test_label_plays_the_chosen_label_again_and_again(page) -> None:  # type: ignore[no-untyped-def]

@@ -17,8 +17,12 @@ export class Design extends EventTarget {
   selected = null; // an entry
   lane = 0; // number of the channel that new blocks go to
   preview = null; // the state during a gesture
-  frame = 0.04; // s, a step of the arrow keys
   state = empty();
+
+  // Seconds of a step of the arrow keys.
+  get frame() {
+    return 0.04;
+  }
 
   get shown() {
     return (this.preview ?? this.state).timeline;
