@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from realizer.behaviours import media
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.behaviours.media import MediaError
 from realizer.behaviours.sound_file import read_sound
+from realizer.core.similar import did_you_mean, similar
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import Recording, Utterance
 
@@ -41,8 +41,7 @@ def _clip(name: str) -> str | None:
 
 def _client_clip(id: str, context: PlanningContext) -> Recording:
     if id not in context.clips:
-        near = difflib.get_close_matches(id, list(context.clips))
-        suggestion = f', did you mean "{CLIP}{near[0]}"?' if near else ""
+        suggestion = did_you_mean(f'"{CLIP}{clip}"' for clip in similar(id, context.clips, 1))
         raise MediaError(f"wanted a clip that was sent to its last piece, got {CLIP + id!r}{suggestion}")
     return context.clips[id]
 

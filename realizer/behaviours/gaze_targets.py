@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import re
 from collections.abc import Sequence
@@ -16,6 +15,7 @@ from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.kind import Fault, PlanningContext, Position
 from realizer.core.array_types import Float64
+from realizer.core.similar import similar
 
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
 POINT = re.compile(",".join([NUMBER] * 3))
@@ -83,7 +83,7 @@ def check_target(node: Gaze | GazeShift | HeadDirectionShift, context: PlanningC
     if context.scene is None or is_known(node.target, context):
         return ()
     target = node.target
-    near = difflib.get_close_matches(target, list(context.scene)) or sorted(context.scene)[:5]
+    near = similar(target, context.scene) or sorted(context.scene)[:5]
     wanted = f"one of {', '.join(near)}" if near else 'a point such as "0,0,1", as the scene is empty'
     return (
         Fault(

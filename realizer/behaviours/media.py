@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections import OrderedDict
@@ -14,6 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.core.errors import RealizerError
+from realizer.core.similar import did_you_mean, similar
 
 T = TypeVar("T")
 
@@ -137,8 +137,8 @@ def _near(folder: Path, parts: list[str]) -> str:
     except (OSError, RuntimeError, ValueError):
         return ""
     lower = {name.lower(): name for name in names}
-    near = difflib.get_close_matches(parts[-1].lower()[:200], lower, cutoff=0.7)
-    return f', did you mean "{"/".join([*parts[:-1], lower[near[0]]])}"?' if near else ""
+    near = similar(parts[-1].lower(), lower, 1, 0.7)
+    return did_you_mean(f'"{"/".join([*parts[:-1], lower[name]])}"' for name in near)
 
 
 def _quoted_name(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache, partial
@@ -16,6 +15,7 @@ from realizer.animation.channel import Channel, Layer
 from realizer.animation.idle.rng import uniform
 from realizer.behaviours.kind import Fault, PlanningContext
 from realizer.core.array_types import Float64, Index
+from realizer.core.similar import did_you_mean, similar
 
 
 def columns(aus: Mapping[tuple[int, str], float], amount: float) -> dict[Target, float]:
@@ -51,11 +51,7 @@ def unknown_word(attribute: str, word: str, known: Iterable[str]) -> Fault:
     # Of names such as "template:grief" only the last part is compared.
     family, _, part = got.upper().rpartition(":")
     parts = {name.rpartition(":")[2]: name for name in names if name.rpartition(":")[0] == family}
-    near = difflib.get_close_matches(part, list(parts), n=3)
-    if not near and len(part) > 2:  # HAPPINESS for HAPPY
-        near = [name for name in parts if name.startswith(part[:3])][:3]
-    suggestions = " or ".join(names[parts[name]] for name in near)
-    hint = f", did you mean {suggestions}?" if near else ""
+    hint = did_you_mean(names[parts[name]] for name in similar(part, parts))
     wanted = f"{attribute}: wanted one of {', '.join(names.values())}"
     return Fault("CANNOT_CREATE_BEHAVIOR", f"{wanted}; got {got!r}{hint}")
 

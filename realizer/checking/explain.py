@@ -1,6 +1,5 @@
 """Findings that explain warnings with marked places and suggestions."""
 
-import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from bml_schema.source import Source, Spot
 from bml_schema.tolerant_scanner import Element
 from realizer.checking.explain_conflicts import explain_conflict
 from realizer.checking.finding import Finding, FindingBuilder, Label
+from realizer.core.similar import similar
 from realizer.scheduling.timing import Warning
 
 _PLACED = re.compile(r"line (\d+)(?:, (/[^\s:]+))?: (.*)", re.DOTALL)
@@ -63,7 +63,7 @@ def finding_of(file: str, source: Source, warning: Warning, vocabulary: Mapping[
 def near(word: str, choices: Iterable[str], cutoff: float = 0.6) -> str | None:
     """Return the choice that is most similar to a word, ignoring case, or None."""
     by_case = {choice.lower(): choice for choice in choices}
-    found = difflib.get_close_matches(word.lower(), by_case, cutoff=cutoff)
+    found = similar(word.lower(), by_case, 1, cutoff)
     return by_case[found[0]] if found else None
 
 

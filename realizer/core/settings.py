@@ -44,9 +44,9 @@ def is_loopback(host: str) -> bool:
 
 
 def _closest(name: str, known: Iterable[str]) -> str | None:
-    from difflib import get_close_matches
+    from realizer.core.similar import similar
 
-    return next(iter(get_close_matches(name, known, cutoff=0.8)), None)
+    return next(iter(similar(name, known, 1, 0.8)), None)
 
 
 def _row(

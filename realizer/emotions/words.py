@@ -1,11 +1,11 @@
 """Profiles for emotion words."""
 
-import difflib
 from collections.abc import Mapping
 from functools import cache
 from types import MappingProxyType
 from typing import NamedTuple
 
+from realizer.core.similar import did_you_mean, similar
 from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
 from realizer.emotions.profile import Profile, split_number
 from realizer.emotions.wheel import NEUTRAL, between, blend_weights, neighbours, wheel
@@ -130,8 +130,7 @@ def _unknown_profile(name: str, number: int, profiles: str) -> str:
     known = archetypes(profiles)
     if name not in known:
         every = [f"{other} {k}" for other, numbered in known.items() for k in numbered]
-        near = difflib.get_close_matches(f"{name} {number}", every, n=3)
-        hint = f", did you mean {' or '.join(near)}?" if near else f"; there are {', '.join(known)}"
+        hint = did_you_mean(similar(f"{name} {number}", every)) or f"; there are {', '.join(known)}"
         return f"emotion: wanted a profile of the {profiles} ones, got '{name[:60]} {number}'{hint}"
     numbers = sorted(known[name])
     has = f"{name} {numbers[0]}" + (f" to {name} {numbers[-1]}" if len(numbers) > 1 else "")
@@ -142,8 +141,7 @@ def _unknown_profile(name: str, number: int, profiles: str) -> str:
 
 
 def _unknown(word: str) -> str:
-    near = difflib.get_close_matches(word, list(known_words()), n=3)
     got = repr(word if len(word) <= 60 else word[:60] + "...")
-    if near:
-        return f"emotion: wanted a known word, got {got}, did you mean {' or '.join(near)}?"
+    if hint := did_you_mean(similar(word, known_words())):
+        return f"emotion: wanted a known word, got {got}{hint}"
     return f"emotion: wanted one of {', '.join(sorted(known_words()))}; got {got}"

@@ -1,6 +1,5 @@
 """The library of expressions by name: templates, lexemes and a user's folder; and their search words."""
 
-import difflib
 import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -11,6 +10,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.errors import TableError
+from realizer.core.similar import did_you_mean, similar
 from realizer.expressions.expression import Expression, key
 from realizer.tables.lexemes import face_lexemes
 from realizer.tables.templates import PREFIX, Template, apex, templates
@@ -81,13 +81,12 @@ class Library(Mapping[str, Expression]):
         for spelling, expression in self._known.items():
             for part in {spelling, spelling.rpartition(":")[2]}:
                 parts.setdefault(part, []).append(expression.name)
-        found = difflib.get_close_matches(key(name)[:100], parts, n=3)
+        found = similar(key(name), parts)
         return list(dict.fromkeys(name for part in found for name in parts[part]))[:3]
 
     def unknown(self, name: str) -> str:
         """Return the error message for an unknown name."""
-        near = self.near(name)
-        hint = f", did you mean {' or '.join(near)}?" if near else ""
+        hint = did_you_mean(self.near(name))
         return f"wanted a name of `realizer expressions list`, got {name[:60]!r}{hint}"
 
 

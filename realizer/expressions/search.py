@@ -1,11 +1,11 @@
 """Search of expressions by words or action units, best match first."""
 
-import difflib
 import re
 from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from realizer.core.similar import similar
 from realizer.expressions.expression import Expression
 from realizer.tables import by_number
 
@@ -45,7 +45,7 @@ def by_meaning(text: str, expressions: Iterable[Expression]) -> list[tuple[Expre
             if weights:
                 # A word in several places counts slightly more.
                 score += max(weights) + 0.1 * (len(weights) - 1)
-            elif difflib.get_close_matches(root, name | means, cutoff=0.85):
+            elif similar(root, name | means, cutoff=0.85):
                 score += SIMILAR
         if score:
             matches.append((expression, min(score / (NAME * len(query)), 1.0)))

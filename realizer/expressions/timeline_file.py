@@ -1,12 +1,12 @@
 """Timeline files: a reader (TOML or JSON) that reports all faults at once, and a writer (TOML)."""
 
-import difflib
 import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, cast, get_args
 
 from realizer.core.errors import TableError
+from realizer.core.similar import did_you_mean, similar
 from realizer.core.toml_text import parse_toml
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
 from realizer.tables import action_units
@@ -72,8 +72,7 @@ class _TimelineReader:
     def _keys(self, row: Mapping[str, Any], known: Sequence[str], place: str) -> None:
         for name in row:
             if name not in known:
-                near = difflib.get_close_matches(name, known)
-                hint = f"; did you mean {near[0]}?" if near else ""
+                hint = did_you_mean(similar(name, known, 1))
                 if place != "timeline" and name in TIMELINE:
                     hint = "; it belongs before all channels"
                 self.faults.append(f"{place}: wanted {', '.join(known)}, got {name!r}{hint}")

@@ -1,6 +1,5 @@
 """A reader for a folder of user expressions (TOML) that reports all faults at once."""
 
-import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import TableError
+from realizer.core.similar import did_you_mean, similar
 from realizer.core.toml_text import parse_toml
 from realizer.expressions.expression import Expression, key
 from realizer.tables.lexemes import read_aus
@@ -83,8 +83,7 @@ class _FileReader:
     def expression(self) -> Expression | None:
         """Return the expression, or None if the file has faults."""
         for name in self.row.keys() - set(KEYS):
-            near = difflib.get_close_matches(name, KEYS)
-            hint = f", did you mean {near[0]}?" if near else ""
+            hint = did_you_mean(similar(name, KEYS, 1))
             self._fault(name, f"one of {', '.join(KEYS)}", f"{name!r}{hint}")
         name, means, aus = self._name(), self._means(), self._aus()
         onset, apex, offset = self._gaps()

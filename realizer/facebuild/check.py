@@ -2,7 +2,6 @@
 
 import io
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from realizer.core.errors import FaceError, TableError
+from realizer.core.similar import did_you_mean, similar
 from realizer.face.au.file import read_model
 from realizer.face.basis import AGAIN, ARRAYS, ROWS, array_faults
 from realizer.face.deform import deform
@@ -97,8 +97,7 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
 
 
 def _nearest(word: str, words: Any) -> str:
-    near = get_close_matches(word, list(words))
-    return f"; did you mean {near[0]!r}?" if near else f"; there are: {', '.join(words)}"
+    return did_you_mean(similar(word, words, 1)) or f"; there are: {', '.join(words)}"
 
 
 def _part_faults(folder: Path, parts: dict[str, Any], n: int | None) -> list[str]:

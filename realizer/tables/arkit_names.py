@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
+from realizer.core.similar import similar
 from realizer.tables import csv_rows
 
 SIDES = {"left": "Left", "l": "Left", "right": "Right", "r": "Right"}
@@ -75,8 +76,7 @@ def other_side(name: str) -> str:
 
 def nearest(name: str) -> tuple[str, ...]:
     """Return the ARKit names most similar to a name, for messages."""
-    from difflib import get_close_matches
-
     letters = re.sub(r"[^a-z0-9]", "", re.split(r"[.:|/]", name)[-1].lower())
-    similar = get_close_matches(letters, list(_spellings()), n=3, cutoff=0.72)
-    return tuple(dict.fromkeys(_spellings()[spelling] for spelling in similar))
+    return tuple(
+        dict.fromkeys(_spellings()[spelling] for spelling in similar(letters, _spellings(), 3, 0.72))
+    )

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
 from realizer import tables
+from realizer.core.similar import similar
 
 Role = Literal["speaker", "listener"]
 By = Literal["before", "after", "around", "with"]
@@ -67,7 +67,7 @@ class Knowledge:
         """Return the mood for a word in any case; raises KeyError, whose text lists similar words."""
         name = word.strip().lower()
         if name not in self.moods:
-            near = get_close_matches(name, self.moods, 3, 0.6) or sorted(self.moods)
+            near = similar(name, self.moods) or sorted(self.moods)
             wanted = f"a word such as {', '.join(near)}" if near else "none, as this knowledge has no moods"
             raise KeyError(f"mood: wanted {wanted}; got {word!r}")
         return self.moods[name]

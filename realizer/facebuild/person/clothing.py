@@ -1,6 +1,5 @@
 """Clothing cut from and lifted above the body, and glasses: two rims, a bridge and two temples."""
 
-import difflib
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
+from realizer.core.similar import did_you_mean, similar
 from realizer.face.mesh_geometry import edges_of, grid, vertex_normals
 from realizer.facebuild.decimate import decimate
 from realizer.facebuild.parts import Part, Submesh, smooth
@@ -98,8 +98,7 @@ def glasses_of(table: Mapping[str, Any]) -> dict[str, Any] | None:
         if key == "style":
             continue
         if key not in plain:
-            near = difflib.get_close_matches(key, plain, 1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
+            hint = did_you_mean(similar(key, plain, 1))
             raise FaceError(f"glasses: wanted one of style, {', '.join(plain)}, got {key!r}{hint}")
         kind = list if key == "colour" else (int, float)
         if not isinstance(value, kind) or isinstance(value, bool):

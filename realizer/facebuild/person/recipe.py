@@ -1,6 +1,5 @@
 """The recipe.toml of a person: sliders, or shape targets and colours; hair and look."""
 
-import difflib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -8,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.errors import FaceError
+from realizer.core.similar import did_you_mean, similar
 from realizer.core.toml_text import parse_toml
 from realizer.face.reading import face_errors
 from realizer.facebuild.hair.style import style_of
@@ -141,9 +141,9 @@ def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
         faults.append("targets: wanted at least one of macrodetails/..., got none")
     for name, weight in targets.items():
         if name not in known:
-            near = difflib.get_close_matches(name, known, 1, 0.4)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            faults.append(f"targets: {name}: no such shape target{hint}")
+            faults.append(
+                f"targets: {name}: no such shape target{did_you_mean(similar(name, known, 1, 0.4))}"
+            )
         if not is_number(weight) or not 0 <= weight <= 1:
             faults.append(f"targets: {name}: wanted a weight 0..1, got {weight!r}")
     return faults

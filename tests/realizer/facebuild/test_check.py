@@ -74,9 +74,12 @@ def masked(folder: Path) -> None:
 BROKEN: dict[str, tuple[Callable[[Path], object], tuple[str, ...]]] = {
     "an unknown key": (
         lambda f: edit(f / "face.toml", "licence =", 'lisence = "x"\nlicence ='),
-        ("face.toml: 'lisence'", "did you mean 'licence'?"),
+        ("face.toml: 'lisence'", "did you mean licence?"),
     ),
-    "an unknown part": (lambda f: edit(f / "face.toml", "tongue =", "tung ="), ("'tung'", "'tongue'")),
+    "an unknown part": (
+        lambda f: edit(f / "face.toml", "tongue =", "tung ="),
+        ("'tung'", "did you mean tongue?"),
+    ),
     "no skin": (lambda f: edit(f / "face.toml", "skin =", "shirt2 ="), ("wanted 'skin', got none",)),
     "parts that overlap": (
         lambda f: edit(f / "face.toml", "\nshirt = [", "\nshirt = [0, 50]\nother = ["),

@@ -144,7 +144,7 @@ def test_glasses_take_other_figures():
     ("table", "fault"),
     [
         ({"style": "monocle"}, "style: wanted one of round, square, got 'monocle'"),
-        ({"style": "round", "widht": 1}, "got 'widht'; did you mean 'width'?"),
+        ({"style": "round", "widht": 1}, "got 'widht', did you mean width?"),
         ({"style": "round", "width": "wide"}, r"width: wanted 0\.0235 or the like, got 'wide'"),
     ],
 )

@@ -58,7 +58,7 @@ def test_read_recipe_keeps_what_is_written(data: Path) -> None:
         ("says = 'Eve'", "says = ' '", "says: wanted a sentence about the person, got ' '"),
         ("says = 'Eve'", "person = {age = 200}", "person: age: wanted a number 18..95, got 200"),
         ("says = 'Eve'", "says = 'Eve'\nsings = 1", "wanted one of says, "),
-        ("*eye-scale-incr", "*eye-scale-inc", "did you mean 'eyes/*eye-scale-incr'?"),
+        ("*eye-scale-incr", "*eye-scale-inc", "did you mean eyes/*eye-scale-incr?"),
         ("*eye-scale-incr", "l-eye-scale-incr", "targets: eyes/l-eye-scale-incr: no such shape target"),
         ("= 0.5", "= 1.5", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got 1.5"),
         ("= 0.5", "= nan", "targets: eyes/*eye-scale-incr: wanted a weight 0..1, got nan"),
