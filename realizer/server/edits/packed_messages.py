@@ -28,10 +28,10 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
         listed[name][2] = at
         at += -(-array.nbytes // ALIGN) * ALIGN
     text = json.dumps({**header, "arrays": listed}).ljust(start - 4).encode()
-    body = b"".join(
-        array.tobytes().ljust(-(-array.nbytes // ALIGN) * ALIGN, b"\0") for array in rows.values()
-    )
-    return len(text).to_bytes(4, "little") + text + body
+    parts: list[bytes | memoryview] = [len(text).to_bytes(4, "little"), text]
+    for array in rows.values():
+        parts += array.reshape(-1).view(np.uint8).data, bytes(-array.nbytes % ALIGN)
+    return b"".join(parts)
 
 
 def unpacked(message: str | bytes) -> tuple[dict[str, Any], bytes]:

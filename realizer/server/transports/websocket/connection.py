@@ -6,7 +6,6 @@ import http
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import lru_cache
-from importlib import import_module
 from typing import Protocol
 
 from websockets.asyncio.server import ServerConnection
@@ -28,7 +27,6 @@ from realizer.server.transports.websocket.protocol import Connection
 log = logging.getLogger(__name__)
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
-LABELLING = "realizer.corpus.labelling"  # imported by name: that package builds on this one
 REASON = 123  # bytes of a reason in a close frame
 
 
@@ -206,11 +204,12 @@ class WebSocketConnections:
     async def _edit(self, client: ClientSocket) -> None:
         """Serve the WebSocket of a page that edits a face or labels: answer its messages in their order."""
         from realizer.face.load import face_tool
+        from realizer.server.edits.labelling import Labelling
 
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
         if path_of(client.target) == "/label":
-            tool = import_module(LABELLING).Labelling(self._settings.corpus, may_save=may_save)
+            tool = Labelling(self._settings.corpus, may_save=may_save)
         else:
             tool = face_tool("Studio")(self._settings.edit if may_save else None)
         loop = asyncio.get_running_loop()

@@ -123,15 +123,15 @@ class Labelling:
 
     def _compare(self, asked: dict[str, Any]) -> Any:
         """Return the agreement of `annotator`, who has these `labels`, with the annotator `other`."""
-        found, other = self._changed(asked), str(asked.get("other", ""))
-        pair = (str(asked["annotator"]), other)
-        both = replace(found, labels=tuple(label for label in found.labels if label.by in pair))
+        changed, annotator = self._changed(asked, self._recording(asked))
+        pair = (annotator, str(asked.get("other", "")))
+        both = replace(changed, labels=tuple(label for label in changed.labels if label.by in pair))
         rows = agreement([both]).rows if len(both.annotators) == 2 else ()
         return {"agreement": [list(row) for row in rows]}, {}
 
-    def _changed(self, asked: dict[str, Any]) -> Recording:
-        """Return the recording with the labels of a message in place of its annotator's."""
-        found, annotator = self._recording(asked), str(asked.get("annotator", "")).strip()
+    def _changed(self, asked: dict[str, Any], found: Recording) -> tuple[Recording, str]:
+        """Return a recording with the labels of a message in place of its annotator's, and the annotator."""
+        annotator = str(asked.get("annotator", "")).strip()
         if not annotator or len(annotator) > 64 or not annotator.isprintable():
             raise CorpusError(f"annotator: wanted a name of up to 64 characters, got {annotator[:80]!r}")
         try:
@@ -139,13 +139,13 @@ class Labelling:
         except (KeyError, TypeError, ValueError):
             raise CorpusError("labels: wanted a list of [start, end, expression]") from None
         others = replace(found, labels=tuple(label for label in found.labels if label.by != annotator))
-        return change(others, annotator, added)
+        return change(others, annotator, added), annotator
 
     def _save(self, asked: dict[str, Any]) -> Any:
         if not self._may_save:
             raise CorpusError("your token does not allow to save labels; the draft stays in this browser")
-        changed, found = self._changed(asked), self._recording(asked)
-        annotator = str(asked["annotator"]).strip()
+        found = self._recording(asked)
+        changed, annotator = self._changed(asked, found)
         if (now := _version(found, annotator)) != asked.get("version"):
             raise Conflict(f"{found.name}: the labels of {annotator} were changed since you opened them", now)
         folder = self._corpus() / found.name
@@ -174,5 +174,5 @@ def _rows(recording: Recording, annotator: str) -> list[list[object]]:
 
 
 def _version(recording: Recording, annotator: str) -> str:
-    """Return the version of an annotator's labels: those of others may change meanwhile."""
+    """Return the version of one annotator's labels, which does not change when others save theirs."""
     return version_of(json.dumps(_rows(recording, annotator)).encode())

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realizer.corpus.labelling import Labelling
 from realizer.corpus.recording import Annotation, Recording, read_recording, write_recording
+from realizer.server.edits.labelling import Labelling
 
 EVA = Annotation(0.2, 0.6, "smile", "eva")
 
