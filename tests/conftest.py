@@ -36,7 +36,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--documents", type=int, help="how many random documents test_grammar plays (125)")
     parser.addoption("--mutants", type=int, default=300, help="how many broken documents test_fuzz reads")
     parser.addoption(
-        "--sessions", type=int, default=200, help="how many random sessions test_composition plays"
+        "--sessions", type=int, default=100, help="how many random sessions test_composition plays"
     )
     parser.addoption(
         "--pipecat", action="store_true", help="install Pipecat for tests/examples/test_pipecat.py"

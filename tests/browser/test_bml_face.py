@@ -121,7 +121,7 @@ def test_bml_face_moves_the_mouth_of_our_own_face(show) -> None:  # type: ignore
 
 
 def test_bml_face_says_what_is_typed_with_sound(show) -> None:  # type: ignore[no-untyped-def]
-    page = loaded(show("ada.glb"))
+    page = loaded(show("plate.glb"))
     page.fill("input", "Papa & Mama <spoke>")
     page.click("form button")
     page.wait_for_function(f"({WEIGHT})('jawOpen') > 0.05")

@@ -61,6 +61,7 @@ def test_as_text_has_a_heading_for_each_step(steps: dict[str, Step]) -> None:
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_as_html_has_a_timeline_and_a_picture(steps: dict[str, Step], played: realizer.Realization) -> None:
     page = as_html(list(steps.values()), played)
     assert "Timeline of b" in page

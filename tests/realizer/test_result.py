@@ -32,6 +32,7 @@ def test_save_writes_every_suffix_and_returns_the_path(
 
 
 @pytest.mark.gl
+@pytest.mark.slow
 def test_save_draws_with_camera_light_and_size(played: realizer.Realization, tmp_path: Path) -> None:
     path = played.save(tmp_path / "x.png", at=0.5, camera="profile", light="studio", size=(64, 48))
     with Image.open(path) as picture:

@@ -29,6 +29,7 @@ def drawn(face: str, light: str, size: tuple[int, int], intensity: float) -> lis
     return list(drawn_here(face, size, poses(frames, input_names(face)), light=light)[..., :3])
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_by_picture_finds_face_light_and_expression_at_any_size() -> None:
     small = drawn("ben", "evening", (150, 200), 0.7)

@@ -76,6 +76,7 @@ def test_glb_is_valid_and_looks_like_the_face_in_three_js(played, path, read_by)
         assert mean(got, split(played.face, vertices)) < TOLERANCE / 2
 
 
+@pytest.mark.slow
 def test_glb_of_the_service_is_valid_and_looks_like_the_face_in_three_js(tmp_path, read_by):
     face = load_face("default")
     (tmp_path / "x.glb").write_bytes(face_glb(face))
@@ -108,6 +109,7 @@ def test_glb_weights_are_0_to_1(played, path):
         np.testing.assert_allclose(got, wanted, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_glb_moves_pushed_eyes_by_their_nodes(tmp_path, read_by):
     face = load_face("default")
     poses = np.zeros((4, len(face.inputs)), np.float32)
@@ -121,6 +123,7 @@ def test_glb_moves_pushed_eyes_by_their_nodes(tmp_path, read_by):
         assert mean(got, split(face, vertices)) < TOLERANCE / 2
 
 
+@pytest.mark.slow
 def test_glb_includes_eyes_without_balls_in_the_face(tmp_path, read_by):
     face = load_face("default")
     flat = replace(face, basis={**face.basis, "eyes": tuple(((0, 0), at) for _, at in face.basis["eyes"])})

@@ -28,6 +28,7 @@ def light(kind=CLOTH, normal=FRONT, view=FRONT, albedo=GREY, key=FRONT, around=0
     )
 
 
+@pytest.mark.slow
 def test_reflected_light_of_an_even_room_is_the_albedo():
     dark = np.array(light(key=BACK, around=0.5))
     assert dark == pytest.approx(0.5 * GREY, rel=0.02)

@@ -88,6 +88,7 @@ def test_worker_draws_by_the_processor_without_moderngl(tmp_path):
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.long
 @pytest.mark.slow
 def test_worker_compiles_the_loops_without_a_writable_folder(tmp_path):
     """Numba keeps machine code beside the source or in the user's cache, and refuses where neither is."""

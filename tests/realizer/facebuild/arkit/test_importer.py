@@ -86,6 +86,7 @@ def test_import_head_writes_maps_or_nothing(ada_glb: Path, tmp_path: Path) -> No
         inspect_head(source)
 
 
+@pytest.mark.slow
 def test_import_head_removes_the_maps_of_an_import_before(ada_glb: Path, tmp_path: Path) -> None:
     (tmp_path / "normal.webp").write_bytes(b"old")
     (tmp_path / "notes.txt").write_text("mine", "utf-8")

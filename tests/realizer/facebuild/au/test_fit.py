@@ -71,6 +71,7 @@ def test_table_text_prints_wojdel_s_columns(known: Model) -> None:
         assert row.n > 100
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_fit_models_come_nearer_with_more_gaussians() -> None:
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
@@ -101,6 +102,7 @@ def test_fit_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path:
     assert set(read_model(tmp_path / "mine.toml").units) == {2}
 
 
+@pytest.mark.slow
 def test_left_out_text_warns_of_more_figures_than_measurements(known: Model, tmp_path: Path) -> None:
     lines = landmarks(known, (2,), 4).splitlines(keepends=True)
     (tmp_path / "few.csv").write_text("".join(lines[: HEAD.count("\n") + 8]))
@@ -144,6 +146,7 @@ def test_fit_command_writes_a_file_for_each_form(
         return {form: models[form] for form in forms}
 
     monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", fit_again)
+    monkeypatch.setattr("realizer.facebuild.au.fit.left_out_text", lambda *_: "")  # fits again
     given = ["default", "--from", str(path), "-o", str(tmp_path)]
     done = CliRunner().invoke(fit, [*given, *words], catch_exceptions=False)
     assert done.exit_code == 0, done.output

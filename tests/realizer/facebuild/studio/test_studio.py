@@ -105,6 +105,7 @@ def test_studio_reads_back_the_xml_that_it_writes(ada) -> None:  # type: ignore[
     assert once["points"] == {name: list(place) for name, place in head["points"].items()}
 
 
+@pytest.mark.slow
 def test_studio_makes_a_glb_of_an_imported_head(tmp_path: Path) -> None:
     asking = Asking(None)
     try:

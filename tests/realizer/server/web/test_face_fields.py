@@ -29,6 +29,7 @@ MICROMETRE = 1e-6
 EYEBALLS = (27, 28)  # they push the eyeballs too, which the service moves
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.xdist_group("bare"),
     pytest.mark.skipif(NODE is None or not SOURCE.is_dir(), reason="needs Node and the page's sources"),
 ]
 
@@ -47,17 +48,23 @@ def moved_by_page(head: bytes, place: Path) -> dict[tuple[int, float], Any]:
     }
 
 
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bare")
+    import_bare(bare_head(folder / "head.glb"), folder / "bare", "bare")
+    return folder / "bare"
+
+
 @pytest.mark.parametrize("falloff", [None, *FALLOFFS])
-def test_page_moves_vertices_as_the_service_does(tmp_path: Path, falloff: str | None) -> None:
-    import_bare(bare_head(tmp_path / "head.glb"), tmp_path / "bare", "bare")
-    head, arrays = head_message(tmp_path / "bare")
+def test_page_moves_vertices_as_the_service_does(bare: Path, tmp_path: Path, falloff: str | None) -> None:
+    head, arrays = head_message(bare)
     if falloff is not None:
         extra = {"ease": 35.0, "smooth_centre": 0.4, "smooth_side": 0.2}
         head["setup"]["zone"] = [{**zone, "falloff": falloff, **extra} for zone in head["setup"]["zone"]]
     page = moved_by_page(packed(head, arrays), tmp_path)
     studio = Studio()
     try:
-        studio._head = tmp_path / "bare"
+        studio._head = bare
         face = studio._draft({"setup": head["setup"], "keep": False})
     finally:
         studio.close()
@@ -73,5 +80,5 @@ def test_page_moves_vertices_as_the_service_does(tmp_path: Path, falloff: str | 
     }
     assert max(far.values()) < MICROMETRE, sorted(far.items(), key=lambda item: -item[1])[:5]
     assert all(
-        np.abs(page[key] - load_folder(tmp_path / "bare", None).vertices).max() > 1e-4 for key in asked
+        np.abs(page[key] - load_folder(bare, None).vertices).max() > 1e-4 for key in asked
     )
