@@ -53,7 +53,7 @@ def new_session(number: int, ahead: float) -> Session:
 
 def tick(session: Session, now: float) -> float:
     """Do what the host does at a deadline. Return the next one."""
-    if (found := session.frames(now)) is not None:
+    if (found := session.broadcast.frames_alone(now)) is not None:
         return found[1]
     session.tick(now)
     session.take_effects()

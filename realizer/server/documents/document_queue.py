@@ -16,7 +16,6 @@ from realizer.scheduling.timing import Warning
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.documents.pending_blocks import PendingBlock, PendingBlocks, TtsRequests
 from realizer.server.session.effects import Effect
-from realizer.server.session.session_clock import SessionClock
 from realizer.server.speech.speech_streams import SpeechStreams
 from realizer.speech.utterance import SpeechRequest
 
@@ -110,18 +109,13 @@ class DocumentQueue:
 
 
 class Submission:
-    """The submission of a session's documents: it reads them, requests their speech, and plans their blocks.
-
-    Args:
-        clock: the session clock; it stands still while the documents of one message are planned.
-    """
+    """The submission of a session's documents: it reads them, requests speech, and plans blocks."""
 
     def __init__(
         self,
         name: str,
         settings: Settings,
         player: Player,
-        clock: SessionClock,
         add_effects: Callable[[Iterable[Effect]], None],
     ) -> None:
         self.voices: dict[int, str] = {}  # index of a character -> name of its voice
@@ -133,7 +127,6 @@ class Submission:
         self._name = name
         self._settings = settings
         self._player = player
-        self._clock = clock
         self._add_effects = add_effects
         self._message = 0
 
@@ -142,17 +135,25 @@ class Submission:
 
         The end of a message is a change too: it ends the standstill, also in a replay of the journal.
         """
-        t, unread = self._clock.present(t), len(self.queue)
-        done = self._plan_next(t) or self._parse_next(t) or len(self.queue) < unread
-        is_unread = bool(self.queue) and self.queue.message == self._message
-        if not is_unread and not any(w.message == self._message and w.is_ready for w in self.pending.blocks):
-            self._clock.go_on()
-        return done
+        unread = len(self.queue)
+        return self._plan_next(t) or self._parse_next(t) or len(self.queue) < unread
+
+    @property
+    def can_plan(self) -> bool:
+        """Whether a block is ready to be planned."""
+        return self.pending.first_ready() is not None
+
+    @property
+    def is_in_message(self) -> bool:
+        """Whether more of the message whose block was planned last can be read or planned."""
+        if self.queue and self.queue.message == self._message:
+            return True
+        return any(w.message == self._message and w.is_ready for w in self.pending.blocks)
 
     @property
     def has_work(self) -> bool:
         """Whether something can be read or planned now."""
-        return bool(self.queue or self.speeches.has_next or self.pending.first_ready())
+        return bool(self.queue or self.speeches.has_next or self.can_plan)
 
     @property
     def is_idle(self) -> bool:
@@ -228,7 +229,6 @@ class Submission:
         if pending is None:
             return False
         self._message = pending.message
-        self._clock.stand_still(t)
         try:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances)

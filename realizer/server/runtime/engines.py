@@ -5,14 +5,13 @@ from __future__ import annotations
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Hashable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
+from realizer.core.work import FairPool
 from realizer.server.session.effects import Draw, Look, RenderOptions, Speak
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
@@ -171,48 +170,3 @@ class Engines:
         if error not in self._reported:
             self._reported.add(error)
             print(f"realizer: {error}; going on without sound", file=sys.stderr)
-
-
-class FairPool:
-    """A pool of threads: of the owners whose calls wait, each has one call made before another's second."""
-
-    def __init__(self, threads: int, name: str) -> None:
-        self._pool = ThreadPoolExecutor(threads, name)
-        self._waiting: dict[Hashable, deque[tuple[Future[Any], Callable[[], Any]]]] = {}  # in their turns
-        self._lock = threading.Lock()
-
-    def submit(self, owner: Hashable, function: Callable[[], Any]) -> Future[Any]:
-        """Call a function in a thread when it is its owner's turn."""
-        future: Future[Any] = Future()
-        with self._lock:
-            self._waiting.setdefault(owner, deque()).append((future, function))
-        self._pool.submit(self._make_next)
-        return future
-
-    def drop(self, owner: Hashable) -> None:
-        """Cancel the calls of an owner that have not begun."""
-        with self._lock:
-            dropped = self._waiting.pop(owner, ())
-        for future, _ in dropped:
-            future.cancel()
-
-    def close(self) -> None:
-        """Cancel the calls that have not begun; those that have go on."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
-
-    def _make_next(self) -> None:
-        with self._lock:
-            if not self._waiting:
-                return  # calls were dropped
-            owner = next(iter(self._waiting))
-            calls = self._waiting.pop(owner)
-            future, function = calls.popleft()
-            if calls:
-                self._waiting[owner] = calls
-        if future.set_running_or_notify_cancel():
-            try:
-                result = function()
-            except BaseException as error:
-                future.set_exception(error)
-            else:
-                future.set_result(result)

@@ -1,19 +1,21 @@
-"""The connections of a session, and the log of the feedback that is sent to them."""
+"""The connections of a session, their subscriptions, and the log of the feedback that is sent to them."""
 
 import zlib
 from collections import deque
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
-from bml_schema import Feedback
+from bml_schema import Feedback, parse_feedback
 from realizer.core import work
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import Gap
 from realizer.protocol.messages.requests import Save
-from realizer.server.session.effects import Close, Effect, MoveConnection, Send, Write
-from realizer.server.streams.connection import SLOW, STUCK, Connection
+from realizer.server.session.effects import Close, Effect, MoveConnection, RenderOptions, Send, Write
+from realizer.server.streams.audio_stream import AudioSubscription
+from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
 
 FRESH = 60.0  # s; newer messages are kept, unless there are more than MOST
 MOST = 10_000  # messages
@@ -24,6 +26,11 @@ PACK = 2**14
 # has the rest already, or gets `gap`.
 LAST, LAST_TEXT = 1000, 2**19
 BETWEEN = "\0"  # not allowed in XML
+
+# With more unsent bytes than this a connection misses frames: two thirds of a second of a mesh.
+SLOW = 512 * 1024
+# With more than this it is closed. The client can resume with `seen`.
+STUCK = 32 * 2**20
 
 
 class _Pack(NamedTuple):
@@ -119,13 +126,95 @@ class FeedbackLog:
         return list(chain(*reversed(packs), self._recent))[-wanted:]
 
 
+class Drawing(NamedTuple):
+    """A picture that is being drawn: id of its effect `Draw`, number of the frame, and when it was begun."""
+
+    id: int
+    frame: int
+    begun: float
+
+
+@dataclass(eq=False)
+class VideoView:
+    """A view, drawn once for all its subscribers."""
+
+    timeline: FrameTimeline
+    index: int
+    face: str
+    options: RenderOptions
+    next: int  # number of the next frame to draw
+    drawing: Drawing | None = None
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """The values by which two subscriptions share a view."""
+        return (self.index, self.timeline.fps, self.face, self.options)
+
+
+@dataclass(eq=False)
+class VideoSubscription:
+    """A subscription to a view: `next` is the oldest useful frame, `index` the low byte of the flags."""
+
+    view: VideoView
+    next: int
+    index: int
+
+
+@dataclass(eq=False)
+class ScheduleSubscription:
+    """A subscription to schedules; with `needs_full_update` all blocks are sent, not before `retry_at`."""
+
+    index: int | None  # of the character; None: all
+    name: str | None
+    needs_full_update: bool = True
+    retry_at: float = 0.0
+
+
+Subscription = FrameSubscription | AudioSubscription | VideoSubscription | ScheduleSubscription
+
+
+@dataclass(frozen=True)
+class FeedbackFilter:
+    """A filter of the feedback for one connection. Messages keep their numbers, so there are gaps.
+
+    Attributes:
+        character: id of a character; None accepts all. Feedback without a character is always accepted.
+    """
+
+    elements: frozenset[str] | None = None  # names of feedback elements; None accepts all
+    character: str | None = None
+
+    def accepts(self, text: str) -> bool:
+        """Whether the filter lets a message pass."""
+        if self.elements is not None and text[1:].split(maxsplit=1)[0] not in self.elements:
+            return False
+        return self.character is None or parse_feedback(text).character_id in (None, self.character)
+
+
+@dataclass(eq=False)
+class Connection:
+    """One client of a session.
+
+    Attributes:
+        feedback: filter of its feedback; None for no feedback.
+        subscriptions: (stream, character, view) -> subscription.
+    """
+
+    id: int
+    feedback: FeedbackFilter | None = field(default_factory=FeedbackFilter)
+    is_slow: bool = False  # whether more than SLOW bytes are unsent
+    dropped: int = 0  # number of frames, pictures and sound packets it missed because it was slow
+    subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
+    may_edit: bool = False
+
+
 class Connections(dict[int, Connection]):
     """The connections of a session, by id."""
 
     def __init__(self, log: FeedbackLog, add_effects: Callable[[Iterable[Effect]], None]) -> None:
         super().__init__()
         self.log = log
-        self._add_effects = add_effects
+        self.add_effects = add_effects
 
     @property
     def has_slow(self) -> bool:
@@ -152,17 +241,17 @@ class Connections(dict[int, Connection]):
         connection.is_slow = waiting > SLOW
         if waiting > STUCK:
             reason = f"{waiting} bytes wait to be read; reconnect with the session's name and seen"
-            self._add_effects([Close(id, 1013, reason)])
+            self.add_effects([Close(id, 1013, reason)])
         return connection.is_slow
 
     def reply(self, id: int, reply: Reply) -> None:
         """Send a message to a connection."""
         if self:  # the session has not ended
-            self._add_effects([Send(id, reply.text())])
+            self.add_effects([Send(id, reply.text())])
 
     def write(self, id: int, message: Save, folder: Path) -> None:
         """Save a file for a connection, which gets the answer."""
-        self._add_effects([Write(id, message, folder)])
+        self.add_effects([Write(id, message, folder)])
 
     def send_feedback(self, texts: list[str]) -> None:
         """Send feedback to all that want it."""
@@ -179,10 +268,10 @@ class Connections(dict[int, Connection]):
 
     def move(self, id: int, session: str, seen: int | None) -> None:
         """Move a connection to another session, where it gets all feedback after `seen`."""
-        self._add_effects([MoveConnection(id, session, seen)])
+        self.add_effects([MoveConnection(id, session, seen)])
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:
-            self._add_effects(
+            self.add_effects(
                 [Send(connection.id, text) for text in work.counted(texts) if filter.accepts(text)]
             )

@@ -22,11 +22,11 @@ from realizer.protocol.messages.speech import SpeechMessage
 from realizer.protocol.wire import ClipPiece, WireError, unpack_clip
 from realizer.server.documents.document_queue import Submission
 from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.connections import Connection
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, heard_samples
 from realizer.server.speech.speech_streams import PATIENCE
-from realizer.server.streams.connection import Connection
 
 
 @dataclass(eq=False)

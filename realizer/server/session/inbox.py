@@ -13,12 +13,11 @@ from realizer.protocol.streams import STREAMS
 from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.session_journal import SessionJournal
-from realizer.server.session.connections import Connections
+from realizer.server.session.connections import Connection, Connections
 from realizer.server.session.control_fields import FieldError
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.query_handlers import Query, QueryHandlers
 from realizer.server.session.tracked_faces import TrackedFaces
-from realizer.server.streams.connection import Connection
 
 # Messages that affect only their own connection: they are not written to the journal.
 PASSING = (*get_args(Query), Subscribe, Unsubscribe, Track)

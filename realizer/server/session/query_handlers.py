@@ -24,8 +24,7 @@ from realizer.protocol.streams import STREAMS
 from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.connections import Connections
-from realizer.server.streams.connection import Connection
+from realizer.server.session.connections import Connection, Connections
 
 Query = Hello | Save | StateQuery | Ping
 OFF = "wanted a service that saves files: `realizer serve --edit DIR`"

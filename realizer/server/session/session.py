@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
-from realizer.core import work
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
@@ -23,18 +22,16 @@ from realizer.server.journal import TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.connections import Connections, FeedbackLog
+from realizer.server.session.connections import Connection, Connections, FeedbackLog
 from realizer.server.session.control_handlers import ControlHandlers
+from realizer.server.session.due_work import DueWork, SessionClock
 from realizer.server.session.effects import Close, Effect
 from realizer.server.session.inbox import Inbox
 from realizer.server.session.query_handlers import QueryHandlers
-from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.streams.broadcast import Broadcast
-from realizer.server.streams.connection import Connection
-from realizer.server.streams.frame_windows import EPSILON
 from realizer.speech.utterance import Utterance
 
 if TYPE_CHECKING:
@@ -86,27 +83,25 @@ class Session:
             veto=lambda block, schedule: duration_error(block, schedule, settings),
         )
         self.broadcast = Broadcast(self.player, self.faces)
-        self.submission = Submission(id, settings, self.player, self.clock, self._add_effects)
+        self.submission = Submission(id, settings, self.player, self._add_effects)
         self.feedback_log = log or FeedbackLog(epoch)
         self.connections = Connections(self.feedback_log, self._add_effects)
         self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
         self.journal = SessionJournal(id, self._checkpoint, self.connections, self.hand_over)
-        self._next_feedback = 0.0  # session clock
-        # When the next event that is neither a frame nor feedback is due; None until it is wanted.
-        self._next_other: float | None = None
         self._effects: list[Effect] = []
-        self._must_end_speech = False  # with the next tick, as a client has left, or sends no more of a clip
-        reply = self.connections.reply
         self.subscriptions = Subscriptions(
-            settings, self.player, self.faces, self.broadcast, self.connections, reply
+            settings, self.player, self.faces, self.broadcast, self.connections
         )
         self.queries = QueryHandlers(
             id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
         )
         self._controls = ControlHandlers(
-            self.player, self.faces, self.clips, self.submission, self.subscriptions, reply
+            self.player, self.faces, self.clips, self.submission, self.subscriptions, self.connections.reply
         )
-        self.tracked = TrackedFaces(self.player, self._add_effects, reply, self._show)
+        self.due = DueWork(
+            self.clock, self.player, self.submission, self.broadcast, self.connections, self._controls
+        )
+        self.tracked = TrackedFaces(self.player, self.connections, self._show)
         self.inbox = Inbox(
             self.player,
             self.submission,
@@ -126,7 +121,7 @@ class Session:
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
-        self._next_other = None
+        self.broadcast.quiet_until = -math.inf
         self.connections[connection] = Connection(
             connection, may_edit=may_edit and self.settings.edit is not None
         )
@@ -146,8 +141,8 @@ class Session:
             self.journal.note(self.clock.read(now), "leave", connection)
         self._controls.on_disconnect(connection, self.clock.read(now))
         self.tracked.drop(connection)
-        self._must_end_speech = True
-        self._next_other = None
+        self.due.must_end_speech = True
+        self.broadcast.quiet_until = -math.inf
         if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
@@ -160,7 +155,7 @@ class Session:
     def close(self) -> None:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
-        self._next_other = None
+        self.broadcast.quiet_until = -math.inf
         self.connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
@@ -168,7 +163,7 @@ class Session:
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
         if self.connections.update_backlog(connection, waiting):
-            self._next_other = None
+            self.broadcast.quiet_until = -math.inf
 
     # messages in --------------------------------------------------------------------------------
 
@@ -177,11 +172,11 @@ class Session:
         if self.closed or connection not in self.connections:
             return
         t = self.clock.read(now)
-        self._send_due(t)
+        self.due.send_before_change(t)
         if self.journal.writer.needs_checkpoint and not self.journal.compact(t):
             return
         in_journal = self.inbox.handle(self.connections[connection], message, t)
-        if not self.closed and self._work(t) and not in_journal:
+        if not self.closed and self.due.work(t) and not in_journal:
             self.journal.note(t, "tick")
 
     # journal ------------------------------------------------------------------------------------
@@ -219,16 +214,16 @@ class Session:
         if self.closed:
             return
         t = self.clock.read(now)
-        self._send_due(t)
+        self.due.send_before_change(t)
         if self.journal.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
-            self._work(t)
+            self.due.work(t)
 
     def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
-        self._next_other = None
+        self.broadcast.quiet_until = -math.inf
         picture = result if isinstance(result, bytes) else None
         effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
         self._effects += effects
@@ -240,7 +235,7 @@ class Session:
         """Take the answer to an effect `Look`."""
         if self.closed:
             return
-        self._next_other = None
+        self.broadcast.quiet_until = -math.inf
         self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
 
@@ -255,31 +250,14 @@ class Session:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
         t = self.clock.read(now)
         starts = not self.submission.has_work
-        if not self.closed and self._work(t, read_documents, starts=starts):
+        if not self.closed and self.due.work(t, read_documents, starts=starts):
             self.journal.note(t, "tick")
-
-    def frames(self, now: float) -> tuple[list[Effect], float] | None:
-        """Return due frames and feedback, and the next deadline; None if `tick` must be called instead.
-
-        This is the fast way for a session in which nothing but frames and feedback is due.
-        """
-        t = now - self.clock.opened
-        if self._next_other is None or t + EPSILON >= self._next_other:
-            return None
-        if t + EPSILON >= self._next_feedback:
-            version = self.player.version
-            self._publish(t)
-            self._next_feedback = self.player.next_change()
-            if self.player.version != version:
-                self._next_other = None
-        sends = self.broadcast.frames_due(t)
-        return [*self.take_effects(), *sends], self.next_due()
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.writer.needs_checkpoint and not self.closed:
-            self._next_other = None
-            self._publish(t := self.clock.read(now))
+            self.broadcast.quiet_until = -math.inf
+            self.due.publish(t := self.clock.read(now))
             self.journal.compact(t)
 
     def replay_until(
@@ -296,69 +274,22 @@ class Session:
             if self.clock.stands_still(due):
                 return  # it was published when the documents of a message had been planned
             before(due)
-            self._publish(due)
-
-    def _work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
-        """Do the work of `tick`. Return whether a document or a speech changed the state.
-
-        Args:
-            starts: whether blocks that start at `t` start.
-        """
-        self._must_end_speech = bool(self.submission.speeches.overdue(t))
-        self._next_other = None
-        self._publish(t, starts=starts)
-        if self.broadcast.active or self.connections.has_subscriptions:
-            self.broadcast.set_subscribers(self.connections.values())
-            self.broadcast.send_due(t, self._effects, is_reading=read_documents and self.submission.has_work)
-        if self.submission.pending.blocks:
-            self._effects += self.submission.tts.expire(t + EPSILON)
-        # A tick reads or plans, not both: so the acknowledgement is sent before planning begins, and due
-        # frames are sent in between.
-        if not read_documents:
-            return False
-        if self._must_end_speech:
-            self._controls.end_overdue_clips(t)
-        done = self.submission.work(t) or self._must_end_speech
-        self._must_end_speech = False
-        if self.submission.speeches.advance(t) or done:
-            self._publish(t, starts=False)
-            return True
-        return False
+            self.due.publish(due)
 
     @property
     def has_documents(self) -> bool:
         """Whether a document can be read or planned now."""
-        if self.closed or self._next_other is not None:
-            return False
-        return self._must_end_speech or self.submission.has_work
+        return not self.closed and self.due.has_documents
 
     def next_due(self) -> float:
         """Return the time of the next event other than documents; infinity if there is none."""
-        if self.closed:
-            return math.inf
-        other, submission, streams = self._next_other, self.submission, self.broadcast
-        if other is None:
-            event, has_documents = self.player.next_event, self.has_documents
-            self._next_feedback = self.player.next_change()
-            if submission.has_work and (start := self.clock.start_of(event)) > event:
-                self._next_feedback = start
-            other = min(submission.tts.deadline(), streams.next_other if streams.active else math.inf)
-            if not has_documents:
-                other = min(other, submission.speeches.deadline())
-            # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
-            # the deadline cannot be kept.
-            shown = streams.active and bool(streams.schedule_subscribers)
-            if not (has_documents or self.connections.has_slow or submission.speeches.open_ids or shown):
-                self._next_other = other
-        due = min(other, self._next_feedback, streams.next_frame if streams.active else math.inf)
-        return due + self.clock.opened
+        return math.inf if self.closed else self.due.next_time() + self.clock.opened
 
     @property
     def busy(self) -> bool:
         """Whether a block plays, waits or is being prepared."""
-        return bool(
-            self.submission.queue or len(self.submission.pending) or self.player.next_deadline() is not None
-        )
+        submission = self.submission
+        return bool(submission.queue or submission.pending.blocks) or self.player.next_deadline() is not None
 
     def _add_effects(self, effects: Iterable[Effect]) -> None:
         self._effects += effects
@@ -367,39 +298,3 @@ class Session:
         """Return the effects since the last call, in order."""
         effects, self._effects = self._effects, []
         return effects
-
-    # feedback -----------------------------------------------------------------------------------
-
-    def _publish(self, t: float, *, starts: bool = True) -> None:
-        """Number the feedback that is due and send it to its subscribers.
-
-        Args:
-            starts: whether blocks that start at `t` start; not while more may arrive at this instant.
-        """
-        t = self.clock.present(t)
-        if not starts:
-            self.clock.hold(t)
-        else:
-            self.clock.release()
-            if t <= self.player.next_event <= t + EPSILON:
-                self.clock.end_instant(self.player.next_event)
-        if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
-            self.broadcast.settle(change)
-        texts: list[str] = []
-        while due := self.player.due(t + EPSILON, math.inf if starts else t):
-            for event in work.counted(due, 20):
-                feedback, ending_blocks = self.submission.speeches.process_feedback(event)
-                texts.append(self.feedback_log.add(feedback, t))
-                if ending_blocks:
-                    self.submission.end(ending_blocks, t)
-        if texts:
-            self.connections.send_feedback(texts)
-
-    def _send_due(self, t: float) -> None:
-        """Send due feedback and frames before anything changes, also if the session was woken too late.
-
-        A replay of the journal has no wake-ups in between and must publish the same.
-        """
-        self._publish(t, starts=False)
-        if self.broadcast.active:
-            self._effects += self.broadcast.frames_due(t, is_reading=True)

@@ -1,29 +1,30 @@
 """The subscriptions of a session's clients: `subscribe` and `unsubscribe`."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from realizer.core.settings import Settings, limit_hint
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import PICTURES, Reply
+from realizer.protocol.messages.common import PICTURES
 from realizer.protocol.messages.replies import ErrorMessage, FaceChanged, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
 from realizer.protocol.streams import STREAMS
 from realizer.server.documents.limits import MAX_CHARACTERS, pixel_rate_error
 from realizer.server.session.character_faces import CharacterFaces
-from realizer.server.session.control_fields import FieldError, character_index
-from realizer.server.session.effects import RenderOptions
-from realizer.server.streams.audio_stream import AudioSubscription
-from realizer.server.streams.broadcast import Broadcast
-from realizer.server.streams.connection import (
+from realizer.server.session.connections import (
     Connection,
+    Connections,
     FeedbackFilter,
     ScheduleSubscription,
     Subscription,
     VideoSubscription,
     VideoView,
 )
+from realizer.server.session.control_fields import FieldError, character_index
+from realizer.server.session.effects import RenderOptions
+from realizer.server.streams.audio_stream import AudioSubscription
+from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.frame_windows import SOURCES, FrameSubscription, first_frame_at
 from realizer.server.streams.frames_ahead import AheadSubscription
 
@@ -39,8 +40,7 @@ class Subscriptions:
     player: Player
     faces: CharacterFaces
     broadcast: Broadcast
-    connections: Mapping[int, Connection]
-    reply: Callable[[int, Reply], None]
+    connections: Connections
 
     def subscribe(self, connection: Connection, message: Subscribe, t: float) -> None:
         """Subscribe a connection to a stream, replace its earlier subscription, and reply `subscribed`.
@@ -72,7 +72,7 @@ class Subscriptions:
             old = connection.subscriptions.get(key)
             connection.subscriptions[key], fields = make(connection, message, index, old, t)
         fields |= {"stream": stream, "encoding": encoding, "character": message.character}
-        self.reply(connection.id, Subscribed(**fields))
+        self.connections.reply(connection.id, Subscribed(**fields))
 
     def unsubscribe(self, connection: Connection, message: Unsubscribe) -> None:
         """End a subscription. It is no error if there is none."""
@@ -84,14 +84,14 @@ class Subscriptions:
         """Send the new scale of a character's meshes to their subscribers."""
         for connection, mesh in self.broadcast.face_changed(index):
             fields = {"stream": "mesh", "character": mesh.name, "index": index, "frame": mesh.next}
-            self.reply(connection, FaceChanged(**fields, **self._mesh(index)))
+            self.connections.reply(connection, FaceChanged(**fields, **self._mesh(index)))
 
     def end_pictures(self, connections: Iterable[Connection], fault: str) -> None:
         """End the subscriptions of connections to pictures, which cannot be drawn."""
         for connection in connections:
             for key in [k for k in connection.subscriptions if k[0] == "video"]:
                 del connection.subscriptions[key]
-            self.reply(connection.id, ErrorMessage(code="render", message=fault, where="video"))
+            self.connections.reply(connection.id, ErrorMessage(code="render", message=fault, where="video"))
 
     def views(self, without: Subscription | None = None) -> list[VideoView]:
         """Return the views that are drawn, each once, without that of one subscription."""

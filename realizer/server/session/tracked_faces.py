@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import ErrorMessage, Tracked
 from realizer.protocol.messages.requests import Track
 from realizer.protocol.wire import HEADER
+from realizer.server.session.connections import Connections
 from realizer.server.session.control_fields import character_index
-from realizer.server.session.effects import Effect, Look
+from realizer.server.session.effects import Look
 
 if TYPE_CHECKING:
     from realizer.tracking.mirror import Mirror, Sight
@@ -46,8 +46,7 @@ class TrackedFaces:
     """
 
     player: Player
-    add_effects: Callable[[Iterable[Effect]], None]
-    reply: Callable[[int, Reply], None]
+    connections: Connections
     show: Callable[[int, str, float], None]
     cameras: dict[int, _Camera] = field(default_factory=dict)  # by connection
 
@@ -75,13 +74,13 @@ class TrackedFaces:
             text = (
                 "wanted `track` before pictures" if camera is None else "wanted a picture behind the header"
             )
-            self.reply(connection, ErrorMessage(code="unsupported", message=text))
+            self.connections.reply(connection, ErrorMessage(code="unsupported", message=text))
         elif camera.is_busy:
             camera.waiting = message
         elif t - camera.last[0] >= EARLY / camera.fps:
             _, _, _, number, _ = HEADER.unpack_from(message)
             camera.last, camera.is_busy, camera.waiting = (t, number), True, None
-            self.add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
+            self.connections.add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
 
     def answer(self, connection: int, result: Sight | RealizerError | None, t: float) -> None:
         """Take what a picture shows; then look at the next one."""
@@ -91,7 +90,9 @@ class TrackedFaces:
         camera.is_busy = False
         time, number = camera.last
         if isinstance(result, RealizerError):
-            self.reply(connection, ErrorMessage(code="unsupported", message=str(result), where="track"))
+            self.connections.reply(
+                connection, ErrorMessage(code="unsupported", message=str(result), where="track")
+            )
         else:
             seen: dict[str, Any] = {}
             if result is not None:
@@ -102,6 +103,6 @@ class TrackedFaces:
                 self.show(connection, json.dumps(message), t)
             face = result is not None
             answer = Tracked(character=camera.character, frame=number, time=time, face=face, **seen)
-            self.reply(connection, answer)
+            self.connections.reply(connection, answer)
         if camera.waiting is not None:
             self.picture(connection, camera.waiting, t)

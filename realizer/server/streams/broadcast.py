@@ -8,9 +8,9 @@ from weakref import WeakValueDictionary
 
 from realizer.playback.player import Player
 from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.connections import Connection, ScheduleSubscription, VideoSubscription
 from realizer.server.session.effects import Effect, RenderOptions, Send
 from realizer.server.streams.audio_stream import PACKET, AudioStream, AudioSubscription
-from realizer.server.streams.connection import Connection, ScheduleSubscription, VideoSubscription
 from realizer.server.streams.frame_windows import (
     EPSILON,
     FrameSubscription,
@@ -179,6 +179,7 @@ class Broadcast:
         self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
         self.active = False  # whether there is a subscription; without one nothing is ever due
+        self.quiet_until = -math.inf  # session clock; until then nothing but frames is due
         self.counts = Counter[str]()
         self.overload = Overload()
 
@@ -252,6 +253,15 @@ class Broadcast:
                     effects.append(Send(connection.id, message))
         effects += self.frames_due(now, is_reading=is_reading)
         self.video.due(self._video_subscribers, now, effects)
+
+    def frames_alone(self, now: float) -> tuple[list[Send], float] | None:
+        """Return the due frames, and when something is due next; None if more than frames may be due now.
+
+        This is the fast way for a session in which nothing but frames is due.
+        """
+        if now + EPSILON >= self.quiet_until:
+            return None
+        return self.frames_due(now), min(self.quiet_until, self.next_frame)
 
     def frames_due(self, now: float, *, is_reading: bool = False) -> list[Send]:
         """Return the due frames of fap, au, arkit and mesh.

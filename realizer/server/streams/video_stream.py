@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from realizer.protocol.wire import pack
 from realizer.server.session.character_faces import CharacterFaces
+from realizer.server.session.connections import Connection, Drawing, VideoSubscription, VideoView
 from realizer.server.session.effects import Draw, Effect, RenderOptions, Send
-from realizer.server.streams.connection import Connection, Drawing, VideoSubscription, VideoView
 from realizer.server.streams.frame_windows import EPSILON, FrameTimeline, first_frame_at, last_frame_at
 
 # A picture that takes longer is given up.

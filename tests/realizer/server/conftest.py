@@ -124,13 +124,15 @@ class Driver:
     def wake(self) -> None:
         """As the shell does it."""
         now = self.opened + self.now
-        found = None if self.session.has_documents else self.session.frames(now)
+        found = None
+        if not self.session.has_documents:
+            found = self.session.broadcast.frames_alone(now - self.opened)
         if found is None:
             self.session.tick(self.opened + self.now)
             self.collect()
         else:
             effects, due = found
-            assert due == self.session.next_due()
+            assert due + self.opened == self.session.next_due()
             for effect in effects:
                 self.do(effect)
 

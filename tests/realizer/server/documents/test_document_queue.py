@@ -15,7 +15,7 @@ from realizer.server.documents.document_queue import (
     size_error,
 )
 from realizer.server.documents.limits import MAX_CHARACTERS
-from realizer.server.session.session_clock import STANDSTILL
+from realizer.server.session.due_work import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from random import Random
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from realizer.animation.axis import AU_NAMES
 from realizer.cli import cli
+from realizer.core.array_types import Int32
 from realizer.core.settings import Settings
+from realizer.outputs.output import RenderSettings
+from realizer.protocol.wire import ClipPiece, pack_clip, unpack
 from realizer.server.journal import JournalError, playback
+from realizer.server.journal.entry import SavedSession
 from realizer.server.journal.playback import replay_recording
 from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
 from realizer.server.journal.session_journal import JournalWriter
@@ -18,6 +26,8 @@ from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
+from tests.pictures import drawn_here
+from tests.wake_times import next_wake
 
 SETTINGS = Settings(voice="silent", seed=3)
 SPEECH = """<bml id="a"><speech id="s"><text>Hello, how are <sync id="m"/>you?</text></speech>
@@ -146,3 +156,204 @@ def test_replay_recording_is_silent_without_its_voice(
     assert sum("no-such-voice" in text for text in again) == 1  # in a warning
     assert any('id="b:end"' in text for text in again)
     assert "no-such-voice" in capsys.readouterr().err
+
+
+OPENED = 100.0  # s, on the clock of the host
+WATCH = '{"type": "subscribe", "stream": "fap", "encoding": "binary"}'
+BROW = AU_NAMES().index("4L")
+PLAYED = [
+    '<speech id="s"><text>Hello, how are <sync id="m"/>you today?</text></speech>'
+    '<head id="n" lexeme="NOD" stroke="s:m"/>',
+    '<faceLexeme id="f" lexeme="SMILE" end="1"/>',
+    '<gaze id="g" target="cup" start="0.4" end="1.4"/>',
+    '<faceShift id="f"><faceLexeme id="l" lexeme="SMILE" amount="0.5"/></faceShift>',
+    '<head id="h" lexeme="SHAKE" repetition="2"/>',
+]
+
+
+def setting(**what: object) -> str:
+    return json.dumps({"type": "set", **what})
+
+
+def random_recording(
+    folder: Path,
+    doings: Sequence[tuple[float, str | bytes]],
+    seconds: float,
+    late: Random | None = None,
+    watch: str = WATCH,
+) -> tuple[SavedSession, list[bytes]]:
+    """Return the recording of a session with that input, and what a client received of its stream.
+
+    Args:
+        doings: seconds on its clock, and the message.
+        late: draws how late it is woken; None: never.
+    """
+    session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
+    session.journal.writer = JournalWriter(
+        "s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None))
+    )
+    session.journal.writer.begin(1e9)
+    session.connect(1, OPENED)
+    got: list[bytes] = []
+    answers: list[tuple[float, Speak]] = []
+    coming: list[tuple[float, str | bytes]] = [(OPENED, watch), *((OPENED + t, doing) for t, doing in doings)]
+    now = OPENED
+    while now < OPENED + seconds:
+        due = next_wake(session)
+        soonest = [when for when, _ in (*coming[:1], *answers)]
+        now = max(now, min([OPENED + seconds, *soonest, due]))
+        now += 0.0 if late is None else late.uniform(0, 0.03)
+        if coming and coming[0][0] <= now:
+            session.receive(1, coming.pop(0)[1], now)
+        elif answers and answers[0][0] <= now:
+            order = answers.pop(0)[1]
+            session.on_speech(order.id, speak_to_length(SilentVoice(), order.request), now)
+        else:
+            session.tick(now)
+        for effect in session.take_effects():
+            if isinstance(effect, Speak):
+                answers.append((now + 0.2, effect))
+            elif isinstance(effect, Send) and isinstance(effect.data, bytes):
+                got.append(effect.data)
+    session.disconnect(1, now)
+    session.journal.writer.end()
+    return read_recording(folder), got
+
+
+def faps(got: list[bytes]) -> dict[int, Int32]:
+    """Frame -> (68,) its FAPs."""
+    return {unpack(one).frame: np.frombuffer(unpack(one).payload, "<i4") for one in got}
+
+
+def some(random: Random, seconds: float) -> list[tuple[float, str]]:
+    """Anything, in any order, about twice a second."""
+    doings: list[tuple[float, str]] = []
+    t = 0.1
+    while (t := t + random.expovariate(2.0)) < seconds:
+        value = random.choice([None, 0.3, 0.8])
+        doings.append(
+            (
+                t,
+                random.choice(
+                    [
+                        setting(aus={random.choice(["1", "12L", "26", "4"]): value}),
+                        setting(faps={"open_jaw": random.choice([None, 100, 50])}),
+                        setting(emotion=random.choice([None, {"type": "anger", "intensity": 0.7}])),
+                        '{"type": "stop"}',
+                        '{"type": "speech", "id": "turn", "append": "One two three. And so on. "}',
+                        '{"type": "speech", "id": "turn", "close": true}',
+                        *(
+                            f'<bml id="b{len(doings)}" composition="{composition}">'
+                            f"{random.choice(PLAYED)}</bml>"
+                            for composition in ("MERGE", "APPEND", "REPLACE")
+                        ),
+                    ]
+                ),
+            )
+        )
+    return doings
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_viewer_has_the_frames_of_a_session_woken_late(seed: int, tmp_path: Path) -> None:
+    random = Random(seed)
+    record, got = random_recording(tmp_path, some(random, 6.0), 8.0, random if seed % 2 else None)
+    live = faps(got)
+    again = replay_recording(record)[0].faps.integers()
+    assert len(live) > 190
+    for number, row in live.items():
+        assert np.array_equal(again[number], row), number
+
+
+def test_viewer_frames_last_until_set_values_are_reached(tmp_path: Path) -> None:
+    doings = [(0.5, setting(aus={"4": 1})), (1.0, '{"type": "stop"}')]
+    record, _ = random_recording(tmp_path / "held", doings, 3.0)
+    assert replay_recording(record)[0].duration == record.entries[-1].at == pytest.approx(3.0)
+    record, _ = random_recording(tmp_path / "let go of", [*doings, (2.999, setting(aus=None))], 3.0)
+    faded = replay_recording(record)[0]
+    assert 3.2 < faded.duration < 3.5
+    brow = faded.aus.aus[:, BROW]
+    assert brow[40] > 0.9
+    assert brow[-1] < 0.05
+
+
+def test_viewer_frames_last_until_a_shift_is_complete(tmp_path: Path) -> None:
+    smile = '<faceShift id="f" {}><faceLexeme id="l" lexeme="SMILE"/></faceShift>'
+    for name, timing in (("begun", 'start="0" end="3"'), ("not begun", 'start="2" end="3"')):
+        doings = [(0.5, f'<bml id="b">{smile.format(timing)}</bml>'), (1.5, '{"type": "stop"}')]
+        record, _ = random_recording(tmp_path / name, doings, 2.0)
+        duration = replay_recording(record)[0].duration
+        assert duration == pytest.approx(3.5 if name == "begun" else 2.0, abs=0.1), name
+
+
+def test_viewer_frames_last_until_the_last_block_that_begins(tmp_path: Path) -> None:
+    bmla = 'xmlns:bmla="http://www.asap-project.org/bmla"'
+    never = f'<bml id="n" {bmla} bmla:preplan="true"><head id="h" lexeme="NOD"/></bml>'
+    smile = '<bml id="b"><faceLexeme id="f" lexeme="SMILE" end="3"/></bml>'
+    record, _ = random_recording(tmp_path, [(0.5, never), (0.6, smile)], 1.5)
+    assert replay_recording(record)[0].duration == pytest.approx(3.6, abs=0.1)
+
+
+def test_viewer_hears_a_speech_until_it_was_cut_off(tmp_path: Path) -> None:
+    rate = 8000
+    pcm = np.random.default_rng(1).integers(-9000, 9000, 3 * rate).astype("<i2")
+    clip = pack_clip(ClipPiece("c", 0, rate, pcm.tobytes(), final=True))
+    says = (
+        '<bml xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt" id="b{}" composition="REPLACE"><speech id="s">'
+        '<text>Hello</text><description priority="1" type="audio/x-clip"><bmlt:audiofile fileName="clip:c"/>'
+        "</description></speech></bml>"
+    )
+    doings: list[tuple[float, str | bytes]] = [
+        (0.1, clip),
+        (0.2, says.format(1)),
+        (1.31, says.format(2)),
+        (2.77, '{"type": "stop"}'),
+    ]
+    hear = json.dumps({"type": "subscribe", "stream": "audio", "rate": rate})
+    record, got = random_recording(tmp_path, doings, 4.0, watch=hear)
+    again = replay_recording(record)[0].sound(rate)
+    live = np.zeros_like(again)
+    for packet in map(unpack, got):
+        first = packet.frame * rate // 50
+        if packet.flush:
+            live[first:] = 0
+        else:
+            live[first : first + rate // 50] = np.frombuffer(packet.payload, "<i2")
+    assert len(again) == 4 * rate
+    assert 2.4 < np.count_nonzero(again) / rate < 2.7
+    assert np.array_equal(again, live)
+
+
+def test_viewer_sees_set_values_at_their_time_only(tmp_path: Path) -> None:
+    doings = [(at, setting(faps={"open_jaw": value})) for at, value in ((0.5, 100), (1.5, None), (2.5, 60))]
+    record, _ = random_recording(tmp_path, doings, 3.5)
+    jaw = replay_recording(record)[0].faps.integers()[:, 2]
+    assert [int(jaw[round(25 * at)]) for at in (0.4, 1.2, 2.3, 3.2)] == [0, 100, 0, 60]
+
+
+@pytest.mark.slow
+def test_viewer_sees_the_face_of_the_time(tmp_path: Path) -> None:
+    doings = [(0.2, setting(aus={"12": 1})), (1.01, '{"type": "character", "face": "ben"}')]
+    record, got = random_recording(tmp_path, doings, 2.0)
+    realization, _ = replay_recording(record)
+    again = realization.faps.integers()
+    assert all(np.array_equal(again[number], row) for number, row in faps(got).items())
+    (_, before), (changed, after) = realization.faces
+    assert (before.face_name, changed, after.face_name) == ("ada", 26, "ben")
+    assert (before.frames, after.frames) == (26, realization.frames - 26)
+    size = (48, 48)
+    pictures = list(RenderSettings(size=size).pictures(realization, size, [25, 26]))
+    assert len(pictures) == 2
+    shown = drawn_here("ben", size, realization.poses[[25, 26]])
+    assert np.array_equal(pictures[1], shown[1])
+    assert np.abs(pictures[0].astype(int) - shown[0]).mean() > 5
+
+
+def test_viewer_has_later_characters_from_the_first_frame(tmp_path: Path) -> None:
+    doings = [(0.5, setting(character="a", aus={"1": 1})), (1.0, setting(character="b", aus={"4": 1}))]
+    record, _ = random_recording(tmp_path, doings, 2.0)
+    realization, _ = replay_recording(record)
+    first, second = realization.characters.values()
+    assert first.faps.values.shape == second.faps.values.shape
+    assert second.aus.aus[:24, BROW].max() < 0.15  # no more than an idle face shows
+    assert second.aus.aus[40, BROW] == pytest.approx(1)

@@ -18,10 +18,12 @@ from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Journal, JournalError, TakenOver, journal_at
 from realizer.server.runtime import session_factory
 from realizer.server.runtime.session_factory import SessionFactory
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
 from tests.feedback_log import read_feedback, seq_numbers
+from tests.realizer.server.runtime.test_session_host import Loop, subscribed
 
 LIMIT = 60  # s; a hung test ends
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
@@ -190,3 +192,40 @@ def test_factory_taken_over_finds_none_if_the_journal_cannot_be_read(
     assert asyncio.run(taken_over(journal, [opened("s")])) == []
     assert "it does not answer" in caplog.text
     journal.close()
+
+
+def test_restore_advances_a_resumed_session_to_what_a_client_has_seen(tmp_path) -> None:
+    settings = Settings(voice="silent", journal=str(tmp_path / "journal"), keep=60)
+
+    async def run() -> None:
+        first, second = SessionHost(settings), SessionHost(settings)
+        for host in (first, second):
+            await host.start()
+        number, _ = subscribed(first, "s")
+        first.receive(number, '<bml id="b"><wait id="w" duration="300"/></bml>')
+        await asyncio.sleep(1)
+        await second.restore("s")
+        log = second._registry.sessions["s"].feedback_log
+        before = log.newest
+        await asyncio.sleep(30)
+        assert log.newest == before
+        await second.restore("s", seen=before + 1)
+        assert log.newest > before
+        for host in (first, second):
+            await host.close()
+
+    with asyncio.Runner(loop_factory=Loop) as runner:
+        runner.run(run())
+
+
+def test_restore_finds_nothing_without_a_journal() -> None:
+    async def run() -> None:
+        host = SessionHost(Settings(voice="silent"))
+        await host.start()
+        await host.restore("s", 3)
+        await host.restore(None)
+        assert host.health()["sessions"] == 0
+        await host.close()
+
+    with asyncio.Runner(loop_factory=Loop) as runner:
+        runner.run(run())

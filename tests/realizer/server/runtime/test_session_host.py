@@ -15,9 +15,10 @@ from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.runtime import turns
-from realizer.server.runtime.session_host import MOST_WAITING, SessionHost
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.streams.connection import SLOW
+from realizer.server.runtime.session_runner import MOST_WAITING
+from realizer.server.session.connections import SLOW
 from tests.worst_documents import document
 
 PERIOD = 1 / 25  # s

@@ -1,0 +1,182 @@
+"""The clock of a session, and the work that is due: feedback, frames, sound and documents."""
+
+import math
+from dataclasses import dataclass
+
+from realizer.core import work
+from realizer.playback.player import Player
+from realizer.server.documents.document_queue import Submission
+from realizer.server.session.connections import Connections
+from realizer.server.session.control_handlers import ControlHandlers
+from realizer.server.session.effects import Effect
+from realizer.server.streams.broadcast import Broadcast
+from realizer.server.streams.frame_windows import EPSILON
+
+# The clock stands still for at most so long, while the documents of a message are planned.
+STANDSTILL = 0.1  # s
+
+
+class SessionClock:
+    """The clock of a session, in seconds since the session opened.
+
+    It never goes back, even if the host's clock does: what arrives late counts as arriving now. All documents
+    of one message are planned for one instant: the clock stands still meanwhile. Blocks that start at an
+    instant start after everything that arrives at this instant: until then they are held.
+
+    Args:
+        opened: seconds on the host's clock when the session opened.
+    """
+
+    def __init__(self, opened: float) -> None:
+        self.opened = opened  # seconds on the host's clock at 0 of this one; a restored session moves it
+        self._latest = 0.0  # nothing happens before this time any more
+        self._instant = -math.inf  # where the clock stands still
+        self._held = -math.inf  # blocks that start at this time or earlier are held
+
+    def read(self, now: float) -> float:
+        """Return the time of something that happens, which is at or after all that has happened."""
+        self._latest = max(now - self.opened, self._latest)
+        return self._latest
+
+    def end_instant(self, t: float) -> None:
+        """End an instant, because blocks start at it: what happens next comes after it."""
+        self._latest = max(self._latest, math.nextafter(t, math.inf))
+
+    def stand_still(self, t: float) -> None:
+        """Stand still at a time, for at most `STANDSTILL` or until `go_on`."""
+        self._instant = t
+
+    def go_on(self) -> None:
+        """Go on after standing still."""
+        self._instant = -math.inf
+
+    def stands_still(self, t: float) -> bool:
+        """Return whether it stands still at a time."""
+        return self._instant <= t <= self._instant + STANDSTILL
+
+    def present(self, t: float) -> float:
+        """Return the time at which it stands still, or else `t`."""
+        return self._instant if self.stands_still(t) else t
+
+    def hold(self, t: float) -> None:
+        """Hold the blocks that start at a time, because more may arrive at this instant."""
+        self._held = t
+
+    def release(self) -> None:
+        """Hold no blocks."""
+        self._held = -math.inf
+
+    def start_of(self, event: float) -> float:
+        """Return when a block that is due at `event` starts: later if it is held for documents that wait."""
+        return event if event > self._held else self._held + STANDSTILL
+
+
+@dataclass(eq=False)
+class DueWork:
+    """The work of a session that is due. All times are those of its clock."""
+
+    clock: SessionClock
+    player: Player
+    submission: Submission
+    broadcast: Broadcast
+    connections: Connections
+    controls: ControlHandlers
+    must_end_speech: bool = False  # with the next work, as a client has left, or sends no more of a clip
+
+    def work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
+        """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document.
+
+        Args:
+            starts: whether blocks that start at `t` start.
+
+        Returns:
+            Whether a document or a speech changed the state.
+        """
+        self.must_end_speech = bool(self.submission.speeches.overdue(t))
+        self.broadcast.quiet_until = -math.inf
+        self.publish(t, starts=starts)
+        if self.broadcast.active or self.connections.has_subscriptions:
+            self.broadcast.set_subscribers(self.connections.values())
+            effects: list[Effect] = []
+            self.broadcast.send_due(t, effects, is_reading=read_documents and self.submission.has_work)
+            self.connections.add_effects(effects)
+        if self.submission.pending.blocks:
+            self.connections.add_effects(self.submission.tts.expire(t + EPSILON))
+        # A tick reads or plans, not both: so the acknowledgement is sent before planning begins, and due
+        # frames are sent in between.
+        if not read_documents:
+            return False
+        if self.must_end_speech:
+            self.controls.end_overdue_clips(t)
+        done = self._read_or_plan(t) or self.must_end_speech
+        self.must_end_speech = False
+        if self.submission.speeches.advance(t) or done:
+            self.publish(t, starts=False)
+            return True
+        return False
+
+    def _read_or_plan(self, t: float) -> bool:
+        """Read or plan one block. The documents of one message are planned for one instant."""
+        t = self.clock.present(t)
+        if self.submission.can_plan:
+            self.clock.stand_still(t)
+        done = self.submission.work(t)
+        if not self.submission.is_in_message:
+            self.clock.go_on()
+        return done
+
+    @property
+    def has_documents(self) -> bool:
+        """Whether a document can be read or planned now."""
+        return self.must_end_speech or self.submission.has_work
+
+    def next_time(self) -> float:
+        """Return the time of the next event other than documents; infinity if there is none."""
+        submission, streams = self.submission, self.broadcast
+        event, has_documents = self.player.next_event, self.has_documents
+        feedback = self.player.next_change()
+        if submission.has_work and (start := self.clock.start_of(event)) > event:
+            feedback = start
+        other = min(feedback, submission.tts.deadline(), streams.next_other if streams.active else math.inf)
+        if not has_documents:
+            other = min(other, submission.speeches.deadline())
+        # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
+        # the deadline cannot be kept.
+        shown = streams.active and bool(streams.schedule_subscribers)
+        changes = has_documents or self.connections.has_slow or submission.speeches.open_ids or shown
+        streams.quiet_until = -math.inf if changes else other
+        return min(other, streams.next_frame if streams.active else math.inf)
+
+    def publish(self, t: float, *, starts: bool = True) -> None:
+        """Number the feedback that is due and send it to its subscribers.
+
+        Args:
+            starts: whether blocks that start at `t` start; not while more may arrive at this instant.
+        """
+        t = self.clock.present(t)
+        if not starts:
+            self.clock.hold(t)
+        else:
+            self.clock.release()
+            if t <= self.player.next_event <= t + EPSILON:
+                self.clock.end_instant(self.player.next_event)
+        if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
+            self.broadcast.settle(change)
+        texts: list[str] = []
+        while due := self.player.due(t + EPSILON, math.inf if starts else t):
+            for event in work.counted(due, 20):
+                feedback, ending_blocks = self.submission.speeches.process_feedback(event)
+                texts.append(self.connections.log.add(feedback, t))
+                if ending_blocks:
+                    self.submission.end(ending_blocks, t)
+        if texts:
+            self.connections.send_feedback(texts)
+
+    def send_before_change(self, t: float) -> None:
+        """Send due feedback and frames before anything changes, also if the session was woken too late.
+
+        A replay of the journal has no wake-ups in between and must publish the same.
+        """
+        self.publish(t, starts=False)
+        if self.broadcast.active:
+            self.connections.add_effects(self.broadcast.frames_due(t, is_reading=True))
