@@ -1,4 +1,4 @@
-"""Avatars: which session they show, that nothing depends on their program, and the packets of both protocols."""
+"""Avatars: which session they show, independence of their programs, and the packets of both protocols."""
 
 from __future__ import annotations
 
