@@ -14,6 +14,7 @@ import selectors
 import signal
 import time
 from collections.abc import AsyncIterator, Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import realizer
@@ -67,9 +68,19 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return future
 
 
+def _submit(pool: ThreadPoolExecutor, function: Callable[..., Any], *args: Any, **named: Any) -> Future[Any]:
+    future = Future[Any]()
+    try:
+        future.set_result(function(*args, **named))
+    except Exception as error:
+        future.set_exception(error)
+    return future
+
+
 def run(main: Any) -> Any:
-    """Run a coroutine in a virtual loop."""
+    """Run a coroutine in a virtual loop; pools of threads call functions immediately too."""
     time.time = lambda: EPOCH
+    ThreadPoolExecutor.submit = _submit  # type: ignore[method-assign]
     with asyncio.Runner(loop_factory=VirtualLoop) as runner:
         return runner.run(main)
 
