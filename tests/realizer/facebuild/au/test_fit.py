@@ -138,7 +138,7 @@ def test_fit_command_writes_a_file_for_each_form(
 ) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.faces import fit
+    from realizer.cli.fit_face import fit_face
 
     path, models = fitted
 
@@ -148,7 +148,7 @@ def test_fit_command_writes_a_file_for_each_form(
     monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", fit_again)
     monkeypatch.setattr("realizer.facebuild.au.fit.left_out_text", lambda *_: "")  # fits again
     given = ["default", "--from", str(path), "-o", str(tmp_path)]
-    done = CliRunner().invoke(fit, [*given, *words], catch_exceptions=False)
+    done = CliRunner().invoke(fit_face, [*given, *words], catch_exceptions=False)
     assert done.exit_code == 0, done.output
     assert sorted(file.name for file in tmp_path.glob("*.toml")) == sorted(files)
 
@@ -157,9 +157,9 @@ def test_fit_command_writes_a_file_for_each_form(
 def test_fit_command_needs_a_folder_for_two_forms(tmp_path: Path, output: str) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.faces import fit
+    from realizer.cli.fit_face import fit_face
 
-    done = CliRunner().invoke(fit, ["default", "--form", "both", "-o", str(tmp_path / output)])
+    done = CliRunner().invoke(fit_face, ["default", "--form", "both", "-o", str(tmp_path / output)])
     assert done.exit_code == 2
     assert "wanted a folder" in done.output
 
@@ -167,14 +167,14 @@ def test_fit_command_needs_a_folder_for_two_forms(tmp_path: Path, output: str) -
 def test_fit_command_asks_for_data_without_shapes(tmp_path: Path) -> None:
     from click.testing import CliRunner
 
-    from realizer.cli.faces import fit
+    from realizer.cli.fit_face import fit_face
 
     folder = next(info.path for info in list_faces() if info.name == load_face().name)
     copy = Path(shutil.copytree(folder, tmp_path / "bare"))
     (copy / "au_shapes.npz").unlink()
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("REALIZER_FACES", str(tmp_path))
-        done = CliRunner().invoke(fit, ["bare", "-o", str(tmp_path / "model.toml")])
+        done = CliRunner().invoke(fit_face, ["bare", "-o", str(tmp_path / "model.toml")])
     assert isinstance(done.exception, FaceError)
     assert "--from" in str(done.exception)
     assert not (tmp_path / "model.toml").exists()

@@ -107,11 +107,11 @@ def test_watched_places_are_each_vertex_once_on_the_left(face: Face) -> None:
 def test_fit_command_writes_no_model_that_tears_the_face(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    from realizer.cli.faces import fit
+    from realizer.cli.fit_face import fit_face
 
     model = torn(read_model(FOLDER / "au_published.toml"))
     monkeypatch.setattr("realizer.facebuild.au.fit.fit_models", lambda *_: {"published": model})
-    done = CliRunner().invoke(fit, ["default", "--form", "published", "-o", str(tmp_path)])
+    done = CliRunner().invoke(fit_face, ["default", "--form", "published", "-o", str(tmp_path)])
     assert isinstance(done.exception, FaceError)
     assert "nothing written" in str(done.exception)
     assert "published: AU1 moves the place" in str(done.exception)

@@ -10,12 +10,12 @@ from functools import partial
 from urllib.parse import urlsplit
 
 import pytest
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 pytest.importorskip("starlette", reason="needs the asgi extra")
 
-from realizer.core.settings import Settings, SettingsError
+from realizer.core.settings import Settings
 from realizer.server.asgi.app import create_app, event_of
 from realizer.server.http.access import LEEWAY
 from tests.realizer.server.asgi.conftest import LIMIT, Served
@@ -106,14 +106,6 @@ def test_app_checks_documents(app) -> None:
     assert json.loads(app("POST", "/check", NOD)[2]) == []
 
 
-@pytest.mark.parametrize("path", ["/check", "/realize", "/sessions/s/bml"])
-def test_app_refuses_bodies_that_are_empty_or_too_long(app, path) -> None:
-    assert app.error("POST", path, " ") == (400, "body: wanted BML or a text to speak, got nothing")
-    status, words = app.error("POST", path, "x" * (2**20 + 1))
-    assert status == 413
-    assert words.startswith("body: wanted at most")
-
-
 def test_app_refuses_bad_names_and_other_origins(app) -> None:
     assert app.error("POST", "/sessions/a%20b/bml", NOD)[0] == 400
     assert app.error("GET", "/sessions/s/feedback?seen=x")[0] == 400
@@ -122,46 +114,11 @@ def test_app_refuses_bad_names_and_other_origins(app) -> None:
     assert app("PUT", "/check", NOD)[0] == 405
 
 
-def test_app_asks_for_its_token(serve) -> None:
-    with serve(create_app(Settings(voice="silent", token="secret"))) as app:
-        for method, path in (("POST", "/check"), ("POST", "/sessions/s/bml"), ("DELETE", "/sessions/s")):
-            assert app.error(method, path, NOD)[0] == 401
-        assert app("POST", "/check", NOD, Authorization="Bearer secret")[0] == 200
-        assert app("POST", "/check?token=secret", NOD)[0] == 200
-        with connect(app.url.replace("http", "ws") + "/ws?token=secret", open_timeout=LIMIT) as socket:
-            socket.send('{"type": "ping"}')
-            assert '"pong"' in str(socket.recv(LIMIT))
-        with pytest.raises(InvalidStatus) as refused:
-            connect(app.url.replace("http", "ws") + "/ws?token=wrong", open_timeout=LIMIT)
-        assert refused.value.response.status_code == 401
-
-
 def test_app_ends_a_stream_of_feedback_when_its_token_expires(serve) -> None:
     jwt = pytest.importorskip("jwt")
     with serve(create_app(Settings(voice="silent", jwt_key="secret" * 6))) as app:
         token = jwt.encode({"exp": time.time() - LEEWAY + 1.0}, "secret" * 6, "HS256")
         assert list(events(app, "s", Authorization=f"Bearer {token}")) == []
-
-
-@pytest.mark.parametrize("passes_lifespan_on", [True, False])
-def test_app_runs_inside_another_application(serve, passes_lifespan_on) -> None:
-    fastapi = pytest.importorskip("fastapi")
-    face = create_app(Settings(voice="silent"))
-    lifespan = face.router.lifespan_context if passes_lifespan_on else None
-    outer = fastapi.FastAPI(lifespan=lifespan)
-    outer.mount("/face", face)
-    with serve(outer) as served:
-        assert json.loads(served("GET", "/face/healthz")[2])["status"] == "ok"
-        assert json.loads(served("GET", "/face/openapi.json")[2])["servers"] == [{"url": "/face"}]
-        with connect(served.url.replace("http", "ws") + "/face/ws", open_timeout=LIMIT) as socket:
-            socket.send(NOD)
-            assert "predictionFeedback" in str(socket.recv(LIMIT))
-        assert served("POST", "/face/check", NOD)[0] == 200
-
-
-def test_create_app_refuses_workers() -> None:
-    with pytest.raises(SettingsError, match="an ASGI application is one process"):
-        create_app(Settings(workers=2))
 
 
 def test_event_of_names_elements_and_messages() -> None:

@@ -79,6 +79,4 @@ def test_page_moves_vertices_as_the_service_does(bare: Path, tmp_path: Path, fal
         key: float(np.abs(page[key] - at).max()) for key, at in zip(asked, deform(face, rows), strict=True)
     }
     assert max(far.values()) < MICROMETRE, sorted(far.items(), key=lambda item: -item[1])[:5]
-    assert all(
-        np.abs(page[key] - load_folder(bare, None).vertices).max() > 1e-4 for key in asked
-    )
+    assert all(np.abs(page[key] - load_folder(bare, None).vertices).max() > 1e-4 for key in asked)
