@@ -6,15 +6,19 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
-from bml_schema import Block, BMLError, BMLSizeError, Speech, made_ids, read
+from bml_schema import Block, BMLError, BMLSizeError, made_ids, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings, limit_hint
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import stretch_to_fit, without_stretch
 from realizer.scheduling.timing import Warning
-from realizer.server.documents.limits import MAX_CHARACTERS
-from realizer.server.documents.pending_blocks import PendingBlock, PendingBlocks, TtsRequests
+from realizer.server.documents.pending_blocks import (
+    PendingBlock,
+    PendingBlocks,
+    TtsRequests,
+    block_limit_error,
+)
 from realizer.server.session.effects import Effect
 from realizer.server.speech.speech_streams import SpeechStreams
 from realizer.speech.utterance import SpeechRequest
@@ -31,7 +35,7 @@ class DocumentQueue:
         self._settings = settings
         self._unread: deque[Iterator[Block | BMLError]] = deque()
         self._block_ids = made_ids()  # for documents of dialects that have none
-        self._received = 0  # number of the last message
+        self.received = 0  # number of the last message that came
         self._all_cancelled = 0  # all blocks up to this message are cancelled
         self._cancelled: dict[str, int] = {}  # id of a block -> cancelled up to this message
 
@@ -57,7 +61,7 @@ class DocumentQueue:
                 block_ids=self._block_ids,
             )
         )
-        self._received += 1
+        self.received += 1
         return None
 
     def cancel(self, blocks: Iterable[str] | None) -> None:
@@ -65,9 +69,9 @@ class DocumentQueue:
         if not self._unread:
             return
         if blocks is None:
-            self._all_cancelled = self._received
+            self._all_cancelled = self.received
         else:
-            self._cancelled |= dict.fromkeys(blocks, self._received)
+            self._cancelled |= dict.fromkeys(blocks, self.received)
 
     def is_cancelled(self, block: Block) -> bool:
         """Return whether the block that `next` returned last is cancelled."""
@@ -94,14 +98,9 @@ class DocumentQueue:
         return None
 
     @property
-    def received(self) -> int:
-        """The number of the last message that came."""
-        return self._received
-
-    @property
     def message(self) -> int:
         """The number of the message that is read, or was read last."""
-        return self._received - max(len(self._unread) - 1, 0)
+        return self.received - max(len(self._unread) - 1, 0)
 
     def clear(self) -> None:
         """Remove all messages."""
@@ -139,11 +138,6 @@ class Submission:
         return self._plan_next(t) or self._parse_next(t) or len(self.queue) < unread
 
     @property
-    def can_plan(self) -> bool:
-        """Whether a block is ready to be planned."""
-        return self.pending.first_ready() is not None
-
-    @property
     def is_in_message(self) -> bool:
         """Whether more of the message whose block was planned last can be read or planned."""
         if self.queue and self.queue.message == self._message:
@@ -153,7 +147,7 @@ class Submission:
     @property
     def has_work(self) -> bool:
         """Whether something can be read or planned now."""
-        return bool(self.queue or self.speeches.has_next or self.can_plan)
+        return bool(self.queue or self.speeches.has_next or self.pending.first_ready())
 
     @property
     def is_idle(self) -> bool:
@@ -267,8 +261,7 @@ class Submission:
 
     def _request_speech(self, pending: PendingBlock, requests: Mapping[str, SpeechRequest]) -> None:
         voice = self.voices.get(pending.character) or self._settings.voice
-        with_voice = {b: replace(request, voice=request.voice or voice) for b, request in requests.items()}
-        self._add_effects(self.tts.request(pending, with_voice))
+        self._add_effects(self.tts.request(pending, requests, voice))
 
     def withdraw(self, blocks: list[PendingBlock], t: float) -> None:
         """Remove blocks that are not planned yet."""
@@ -311,25 +304,3 @@ def size_error(text: str, settings: Settings) -> str | None:
         words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
         return f"{words} {limit_hint('max_elements')}"
     return None
-
-
-def block_limit_error(
-    block: Block, settings: Settings, busy: int, characters: Collection[str | None]
-) -> str | None:
-    """Return why a session refuses a block, or None."""
-    longest = _longest_speech(block)
-    if longest > settings.max_speech:
-        words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
-        return f"{words} {limit_hint('max_speech')}"
-    if busy >= settings.max_blocks:
-        words = f"{settings.max_blocks} blocks play or wait: wanted fewer at a time"
-        return f"{words} {limit_hint('max_blocks')}"
-    if block.character_id not in (None, *characters) and len(characters) >= MAX_CHARACTERS:
-        return f"wanted at most {MAX_CHARACTERS} characters in a session"
-    return None
-
-
-def _longest_speech(block: Block) -> int:
-    speeches = [node for node in block.behaviours if isinstance(node, Speech)]
-    texts = [sum(len(part) for part in s.text.parts if isinstance(part, str)) for s in speeches if s.text]
-    return max([0, *texts, *(len(form.content) for s in speeches for form in s.descriptions)])

@@ -118,7 +118,7 @@ class DueWork:
     def _read_or_plan(self, t: float) -> bool:
         """Read or plan one block. The documents of one message are planned for one instant."""
         t = self.clock.present(t)
-        if self.submission.can_plan:
+        if self.submission.pending.first_ready():  # it is planned for this instant
             self.clock.stand_still(t)
         done = self.submission.work(t)
         if not self.submission.is_in_message:

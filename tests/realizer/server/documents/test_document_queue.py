@@ -4,25 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block, BlockProgress, WarningFeedback, parse
-from realizer.behaviours.registry import VOCABULARY
+from bml_schema import Block, BlockProgress, WarningFeedback
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
-from realizer.server.documents.document_queue import (
-    DocumentQueue,
-    block_limit_error,
-    size_error,
-)
-from realizer.server.documents.limits import MAX_CHARACTERS
+from realizer.server.documents.document_queue import DocumentQueue, size_error
 from realizer.server.session.due_work import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
-SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
-SSML = (
-    '<bml id="b"><speech id="s"><text>Oh</text>'
-    '<description priority="1" type="application/ssml+xml"><speak>{}</speak></description></speech></bml>'
-)
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'
 
 
@@ -128,40 +117,6 @@ def test_document_queue_loses_one_message_by_a_bug_of_the_reader(
     assert isinstance(first, Warning)
     assert "internal error" in first.text
     assert isinstance(second, Block)
-
-
-def block(text: str) -> Block:
-    return parse(text, VOCABULARY)
-
-
-@pytest.mark.parametrize(
-    ("most", "text", "busy", "says"),
-    [
-        ({"max_speech": 20}, SPEECH.format("Hello " * 4), 0, "at most 20 characters in one speech, got 24"),
-        ({"max_speech": 60}, SSML.format("Hello " * 20), 0, "at most 60 characters in one speech"),
-        ({"max_blocks": 2}, '<bml id="b"/>', 2, "2 blocks play or wait: wanted fewer at a time"),
-    ],
-)
-def test_block_limit_error_names_the_limit_and_its_setting(
-    most: dict[str, int], text: str, busy: int, says: str
-) -> None:
-    words = block_limit_error(block(text), Settings(**most), busy, ())
-    assert words is not None
-    assert says in words
-    (name,) = most
-    assert words.endswith(f"(REALIZER_{name.upper()} sets it)")
-    assert block_limit_error(block(text), Settings(), busy, ()) is None
-
-
-def test_block_limit_error_bounds_the_number_of_characters() -> None:
-    crowd = [f"c{k}" for k in range(MAX_CHARACTERS)]
-    known, new = (block(f'<bml id="b" characterId="{name}"/>') for name in ("c3", "another"))
-    assert block_limit_error(new, Settings(), 0, crowd[:-1]) is None
-    assert block_limit_error(known, Settings(), 0, crowd) is None
-    assert (
-        block_limit_error(new, Settings(), 0, crowd)
-        == f"wanted at most {MAX_CHARACTERS} characters in a session"
-    )
 
 
 def test_size_error_counts_bytes_and_elements() -> None:
