@@ -14,6 +14,9 @@ Values = TypeVar("Values", Float64, Index)
 
 # Linear channels with at least this many keys (lips have 100 a second) are interpolated separately.
 MANY_KEYS = 32
+DURATION = 0.3  # s until a crossfade has ended: about the attack of an expression
+TOLERANCE = 1e-9  # s; keys that differ by less are equal but for rounding in the scheduler
+STEP = 1e-4  # s over which a slope is measured
 
 
 def smooth(u: Float64) -> Float64:
@@ -206,14 +209,6 @@ def gain_at(gains: Sequence[Gain], times: Float64) -> Float64:
         passed = np.clip((at - begin) / max(end - begin, 1e-9), 0.0, 1.0)  # no length: a step
         total = np.where(at < begin, total, reached + (to - reached) * CURVES[curve](passed))
     return total[: len(times)]
-
-
-# s until a crossfade has ended: about the attack of an expression.
-DURATION = 0.3
-# s; keys that differ by less are equal but for rounding in the scheduler.
-TOLERANCE = 1e-9
-# s over which a slope is measured.
-STEP = 1e-4
 
 
 def crossfade(old: Sequence[Channel], new: Sequence[Channel], now: float) -> tuple[Channel, ...]:

@@ -24,7 +24,7 @@ STATUS = ("done", "refused", "failed")
 
 
 def _formats(context: click.Context, parameter: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
-    """("fap", ".mp4") -> (".fap", ".mp4"), each once."""
+    """Return the suffixes of formats that are given with or without their dot, each once."""
     from realizer.outputs.registry import OUTPUTS
 
     suffixes = dict.fromkeys(f".{name.removeprefix('.').lower()}" for name in value)

@@ -197,7 +197,7 @@ def timeline_json(timeline: Timeline) -> dict[str, Any]:
 
 
 def _fields(row: object, usual: object, *names: str) -> dict[str, Any]:
-    """Return the fields of a row that are not as usual."""
+    """Return the fields of a row that differ from those of `usual`."""
     values = {name: getattr(row, name) for name in names if getattr(row, name) != getattr(usual, name)}
     return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 

@@ -23,6 +23,8 @@ from realizer.speech.utterance import SpeechRequest, Utterance
 
 RUN = Path(__file__).with_name("engine_worker.py")
 CHECKS = 20  # number of checks of a running request within its time limit
+MOST_CACHED = 64  # utterances
+MAX_SAMPLES = 30_000_000  # of cached utterances, about 60 MB
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +40,9 @@ class Engine:
 class EngineProcess:
     """A process that starts with the first request and serves one at a time; thread-safe.
 
-    `limit` is in seconds, after which a request is cancelled and the process is replaced; `options` are
-    further arguments of the process.
+    Args:
+        options: further arguments of the process.
+        limit: seconds after which a request is cancelled, and the process replaced.
     """
 
     def __init__(self, engine: Engine, options: tuple[str, ...] = (), limit: float = 30.0) -> None:
@@ -188,15 +191,11 @@ def _exchange(running: _Running, request: dict[str, Any]) -> tuple[dict[str, Any
     return head, body
 
 
-MOST = 64  # utterances
-MAX_SAMPLES = 30_000_000  # about 60 MB
-
-
 class EngineVoice(BaseVoice):
     """A voice whose engine runs in a process of its own; the same request gives the same samples.
 
     Thread-safe. The process starts with the first request; if it dies, that request fails with VoiceError and
-    the next one starts it again. `limit` is the greatest duration of one request to the engine, in seconds.
+    the next one starts it again. `limit` and `options` are those of `EngineProcess`.
     """
 
     worker: ClassVar[Engine]
@@ -256,7 +255,7 @@ class UtteranceCache:
         with self._lock:
             self._utterances.pop(request, None)  # from another thread
             self._utterances[request] = utterance
-            while len(self._utterances) > MOST or self._samples() > MAX_SAMPLES:
+            while len(self._utterances) > MOST_CACHED or self._samples() > MAX_SAMPLES:
                 del self._utterances[next(iter(self._utterances))]
         return utterance
 

@@ -26,6 +26,11 @@ from realizer.animation.idle.motion import Motion, motion_between
 from realizer.core.array_types import Float64, Index
 
 SPAN = 4.0  # s: blinks are found for spans of this length
+# AUs of brows and lids, of the nose, and of the mouth. Where a document shows one, the small movements of the
+# same part rest, so that its amounts are exact.
+AREAS = ({1, 2, 4, 5, 6, 7, 41, 42, 43, 44, 46}, {9, 38, 39}, {8, *range(10, 38)})
+# Masks that replace the usual saccades by others.
+LOOKS = ("listening", "thinking")
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +79,6 @@ def _blinks(
     saccades = motion_between(start, end, seed).jumps if liveliness else np.zeros(0)
     occasions = Occasions(ends, saccades, shifts) if ends or liveliness else NOTHING
     return blinks_between(start, end, seed, occasions, liveliness)
-
-
-# AUs of brows and lids, of the nose, and of the mouth. Where a document shows one, the small movements of the
-# same part rest, so that its amounts are exact.
-AREAS = ({1, 2, 4, 5, 6, 7, 41, 42, 43, 44, 46}, {9, 38, 39}, {8, *range(10, 38)})
-# Masks that replace the usual saccades by others.
-LOOKS = ("listening", "thinking")
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,8 +34,8 @@ class JournalWriter:
     Args:
         journal: from which another process can resume the session, or None.
         recorder: of the session for replay, or None. The session does not depend on it.
-        on_stopped: is called when the recording has failed and stops.
-        follow: is called after each entry, until it returns False.
+        on_stopped: called when the recording has failed and stops.
+        follow: called after each entry, until it returns False.
     """
 
     def __init__(
@@ -87,8 +87,9 @@ class JournalWriter:
             self._entries += 1
             self._bytes += len(entry.body)
             if self._entries % ENDLESS == 0:
-                words = "session %s: %d entries in its journal and no checkpoint: some block always plays or"
-                log.warning(f"{words} waits", self._session, self._entries)
+                words = "some block always plays or waits"
+                args = self._session, self._entries, words
+                log.warning("session %s: %d entries in its journal and no checkpoint: %s", *args)
             if self._follow is not None and not self._follow():
                 self._follow = None
         self._record(lambda recorder: recorder.add(self._session, entry))

@@ -179,11 +179,78 @@ class Session:
         if not self.closed and self.due.work(t) and not in_journal:
             self.journal.note(t, "tick")
 
-    # journal ------------------------------------------------------------------------------------
-
     def _show(self, connection: int, message: str, t: float) -> None:
         if connection in self.connections:
             self.inbox.handle(self.connections[connection], message, t)
+
+    # answers to effects -----------------------------------------------------------------------------
+
+    def on_speech(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
+        """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
+        if self.closed:
+            return
+        t = self.clock.read(now)
+        self.due.send_before_change(t)
+        if self.journal.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
+            self._effects += self.submission.tts.answer(speak, result, t)
+            self.due.work(t)
+
+    def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
+        """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
+        if self.closed:
+            return
+        picture = result if isinstance(result, bytes) else None
+        effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
+        self._effects += effects
+        if not isinstance(result, bytes):
+            self.subscriptions.end_pictures(viewers, str(result))
+        self.tick(now)
+
+    def on_sight(self, connection: int, result: Sight | RealizerError | None, now: float) -> None:
+        """Take the answer to an effect `Look`."""
+        if self.closed:
+            return
+        self.tracked.answer(connection, result, self.clock.read(now))
+        self.tick(now)
+
+    def on_saved(self, connection: int, reply: Reply, now: float) -> None:
+        """Take the answer to an effect `Write`."""
+        if connection in self.connections:
+            self.connections.reply(connection, reply)
+
+    # time ---------------------------------------------------------------------------------------
+
+    def tick(self, now: float, *, read_documents: bool = True) -> None:
+        """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
+        t = self.clock.read(now)
+        starts = not self.submission.has_work
+        if not self.closed and self.due.work(t, read_documents, starts=starts):
+            self.journal.note(t, "tick")
+
+    @property
+    def has_documents(self) -> bool:
+        """Whether a document can be read or planned now."""
+        return not self.closed and self.due.has_documents
+
+    def next_due(self) -> float:
+        """Return the time of the next event other than documents; infinity if there is none."""
+        return math.inf if self.closed else self.due.next_time() + self.clock.opened
+
+    @property
+    def busy(self) -> bool:
+        """Whether a block plays, waits or is being prepared."""
+        submission = self.submission
+        return bool(submission.queue or submission.pending.blocks) or self.player.next_deadline() is not None
+
+    def _add_effects(self, effects: Iterable[Effect]) -> None:
+        self._effects += effects
+
+    def take_effects(self) -> list[Effect]:
+        """Return the effects since the last call, in order."""
+        effects, self._effects = self._effects, []
+        return effects
+
+    # journal ----------------------------------------------------------------------------------------
 
     def restore(self, parts: Mapping[str, str]) -> float:
         """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
@@ -209,50 +276,6 @@ class Session:
         self.close()
         self._effects += closing
 
-    def on_speech(self, speak: int, result: Utterance | RealizerError, now: float) -> None:
-        """Take the answer to an effect `Speak`. If the voice failed, the silent voice replaces it."""
-        if self.closed:
-            return
-        t = self.clock.read(now)
-        self.due.send_before_change(t)
-        if self.journal.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
-            self._effects += self.submission.tts.answer(speak, result, t)
-            self.due.work(t)
-
-    def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
-        """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
-        if self.closed:
-            return
-        self.broadcast.quiet_until = -math.inf
-        picture = result if isinstance(result, bytes) else None
-        effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
-        self._effects += effects
-        if not isinstance(result, bytes):
-            self.subscriptions.end_pictures(viewers, str(result))
-        self.tick(now)
-
-    def on_sight(self, connection: int, result: Sight | RealizerError | None, now: float) -> None:
-        """Take the answer to an effect `Look`."""
-        if self.closed:
-            return
-        self.broadcast.quiet_until = -math.inf
-        self.tracked.answer(connection, result, self.clock.read(now))
-        self.tick(now)
-
-    def on_saved(self, connection: int, reply: Reply, now: float) -> None:
-        """Take the answer to an effect `Write`."""
-        if connection in self.connections:
-            self.connections.reply(connection, reply)
-
-    # time ---------------------------------------------------------------------------------------
-
-    def tick(self, now: float, *, read_documents: bool = True) -> None:
-        """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
-        t = self.clock.read(now)
-        starts = not self.submission.has_work
-        if not self.closed and self.due.work(t, read_documents, starts=starts):
-            self.journal.note(t, "tick")
-
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.writer.needs_checkpoint and not self.closed:
@@ -275,26 +298,3 @@ class Session:
                 return  # it was published when the documents of a message had been planned
             before(due)
             self.due.publish(due)
-
-    @property
-    def has_documents(self) -> bool:
-        """Whether a document can be read or planned now."""
-        return not self.closed and self.due.has_documents
-
-    def next_due(self) -> float:
-        """Return the time of the next event other than documents; infinity if there is none."""
-        return math.inf if self.closed else self.due.next_time() + self.clock.opened
-
-    @property
-    def busy(self) -> bool:
-        """Whether a block plays, waits or is being prepared."""
-        submission = self.submission
-        return bool(submission.queue or submission.pending.blocks) or self.player.next_deadline() is not None
-
-    def _add_effects(self, effects: Iterable[Effect]) -> None:
-        self._effects += effects
-
-    def take_effects(self) -> list[Effect]:
-        """Return the effects since the last call, in order."""
-        effects, self._effects = self._effects, []
-        return effects

@@ -8,6 +8,8 @@ from typing import Protocol
 from realizer.core.registry import Registry
 from realizer.core.settings import Settings
 
+log = logging.getLogger(__name__)
+
 
 class Outbound(Protocol):
     """The way out to one client. Called in the event loop; never blocks."""
@@ -56,8 +58,6 @@ class Transport(Protocol):
         ...
 
 
-log = logging.getLogger(__name__)
-
 # The name is the setting that requests the transport. One of a plug-in has none and is always requested.
 TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
     "realizer.transports",
@@ -75,7 +75,7 @@ TRANSPORTS: Registry[Callable[..., Transport | None]] = Registry(
 
 
 def requested(settings: Settings) -> Iterator[Callable[..., Transport | None]]:
-    """Yield the factories of the transports that the settings request; where one of a plug-in fails, None."""
+    """Yield the factories of the transports that the settings request; one of a plug-in may return None."""
     names = [name for name in TRANSPORTS if getattr(settings, name, name) is not None]
     for name, make in TRANSPORTS.working(names):
         yield make if hasattr(settings, name) else partial(_made, name, make)

@@ -29,6 +29,9 @@ from realizer.speech.ssml_prosody import PLAIN, Prosody
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word
 from realizer.speech.words import PlacedMark, words_in
 
+INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
+SHOWN = 3  # words quoted in a warning
+
 
 @dataclass(frozen=True, slots=True)
 class ProsodyRun:
@@ -83,10 +86,6 @@ def runs(script: Script) -> tuple[tuple[ProsodyRun, ...], tuple[PlacedMark, ...]
             hidden += 1 if part.attributes is not None else -1
     close()
     return tuple(found), tuple(marks)
-
-
-INSTALL = "hibari (neural, English) is not installed: pip install 'bml-realizer[neural]'"
-SHOWN = 3  # words quoted in a warning
 
 
 def install_hint() -> str | None:

@@ -15,7 +15,7 @@ import pytest
 
 from realizer.core.errors import VoiceError
 from realizer.speech import engine_voice
-from realizer.speech.engine_voice import MOST, Engine, EngineProcess, EngineVoice, UtteranceCache
+from realizer.speech.engine_voice import MOST_CACHED, Engine, EngineProcess, EngineVoice, UtteranceCache
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import SpeechRequest, Utterance
 
@@ -80,7 +80,7 @@ def test_cache_returns_an_equal_request_without_synthesis() -> None:
 
 def test_cache_drops_the_utterance_that_was_not_used_for_longest() -> None:
     utterances, speaker = UtteranceCache(), Speaker()
-    for k in range(MOST):
+    for k in range(MOST_CACHED):
         utterances.get(SpeechRequest(str(k)), speaker)
     utterances.get(SpeechRequest("0"), speaker)  # now 1 is the oldest
     utterances.get(SpeechRequest("new"), speaker)
