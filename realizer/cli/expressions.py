@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # Least cosine of the best match; the motion of an idle head reaches 0.3.
 MIN_SIMILARITY = 0.4
+LEAST_SEEN = 0.15  # of a tracked action unit: one picture alone shows others by mistake
 
 sheet_output = option("-o --output SHEET.png", "Draw the expressions as well.", options.OUTPUT)
 
@@ -70,7 +71,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 @option("--au 1,2,12L=0.5", "Search by action units.", ActionUnits(), name="units")
 @option(
     "--like IMAGE",
-    "Search by a picture of a built-in face, from the front, in one of the lights of --light.",
+    "Search by a picture of a face: one that this program drew from the front, or any other.",
     options.FILE,
 )
 @option("--limit", "Largest number of results.", click.IntRange(1), default=8)
@@ -78,7 +79,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
 @sheet_output
 @option(
     "--face NAME",
-    "Face to draw; also the face in the picture of --like.  [default: default; any with --like]",
+    "Face to draw; also the built-in face in the picture of --like.  [default: default; any with --like]",
 )
 @options.expressions
 def find(text: str | None, units: Any, like: Path | None, output: Path | None, **how: Any) -> int:
@@ -104,15 +105,8 @@ def find(text: str | None, units: Any, like: Path | None, output: Path | None, *
     elif units is not None:
         matches = by_action_units(units, library)
     else:
-        from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
-
         assert like is not None
-        with inputs.reporting(UnknownPictureError):
-            found = by_picture(read_picture(like), library, None if face is None else [face])
-        face, matches = found.face, [match for match in found.matches if match[1] > 0]
-        if matches and matches[0][1] < MIN_SIMILARITY:
-            matches = []
-        note(f"{like}: {face}, {found.light}{', neutral' if found.neutral else ''}")
+        face, matches = _like(like, library, face)
     matches = matches[: how["limit"]]
     matching, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
     _print_matches(matching, scores, how["as_json"])
@@ -122,6 +116,47 @@ def find(text: str | None, units: Any, like: Path | None, output: Path | None, *
     elif output is not None:
         _draw(matching, scores, output, face or "default")
     return 0 if matches else 1
+
+
+def _like(
+    path: Path, library: Sequence[Expression], face: str | None
+) -> tuple[str | None, list[tuple[Expression, float]]]:
+    """Return the face in a picture, None for one that is not ours, and the expressions, best match first."""
+    from realizer.analysis.picture_search import UnknownPictureError, by_picture, read_picture
+
+    with inputs.reporting(UnknownPictureError):
+        picture = read_picture(path)
+        try:
+            found = by_picture(picture, library, None if face is None else [face])
+        except UnknownPictureError:
+            if face is not None:
+                raise
+            return None, _tracked(path, library)
+    note(f"{path}: {found.face}, {found.light}{', neutral' if found.neutral else ''}")
+    matches = [match for match in found.matches if match[1] > 0]
+    return found.face, matches if matches and matches[0][1] >= MIN_SIMILARITY else []
+
+
+def _tracked(path: Path, library: Sequence[Expression]) -> list[tuple[Expression, float]]:
+    """Return the expressions with the action units that are tracked in a picture, best match first."""
+    from realizer.cli.track import follow
+    from realizer.expressions.search import by_action_units
+    from realizer.tables.lexemes import read_aus
+    from realizer.tracking.network import TrackingError
+    from realizer.tracking.recording import record
+    from realizer.tracking.regressor import SEEN_UNITS
+
+    with inputs.reporting(TrackingError):
+        times, people = follow(path, None)
+    values = record(people[0], times, 25.0).units[0]
+    shown = {
+        unit: round(float(value), 2)
+        for unit, value in zip(SEEN_UNITS, values, strict=True)
+        if value >= LEAST_SEEN
+    }
+    seen = ", ".join(f"{unit}={value}" for unit, value in shown.items())
+    note(f"{path}: none of our faces; action units {seen or 'at rest'}")
+    return by_action_units(read_aus(shown, str(path)), library)
 
 
 def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:

@@ -5,11 +5,16 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from realizer.animation.axis import au_row
+from realizer.animation.frames import AUFrames
+from realizer.animation.pose import poses
 from realizer.cli import cli
 from realizer.expressions.library import builtin
+from realizer.face.load import input_names, list_faces
 from tests.pictures import drawn_here
 
 
@@ -78,7 +83,6 @@ def test_find_without_a_match_exits_with_1() -> None:
 @pytest.mark.slow
 @pytest.mark.long
 def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> None:
-    import numpy as np
     from PIL import Image
 
     pose = np.zeros((1, 68), np.float32)
@@ -91,3 +95,17 @@ def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> Non
     )
     assert done.stdout == ""
     assert (done.return_value, "no expression matches" in done.stderr) == (1, True)
+
+
+@pytest.mark.xdist_group("picture_search")
+@pytest.mark.slow
+def test_find_like_tracks_a_picture_of_none_of_our_faces(tmp_path: Path, monkeypatch) -> None:
+    from PIL import Image
+
+    ada = [info for info in list_faces() if info.name == "ada"]
+    monkeypatch.setattr("realizer.analysis.picture_search.list_faces", lambda: ada)
+    smile = poses(AUFrames(np.zeros(1), au_row({(12, "BOTH"): 1.0})[None]), input_names("nia"))
+    Image.fromarray(drawn_here("nia", (300, 400), smile, camera="close")[0]).save(tmp_path / "x.png")
+    done = CliRunner().invoke(cli, ["expressions", "find", "--like", str(tmp_path / "x.png"), "--json"])
+    assert "none of our faces; action units" in done.stderr
+    assert {row["name"] for row in json.loads(done.stdout)[:2]} == {"SMILE", "RAISE_MOUTH_CORNERS"}
