@@ -26,6 +26,7 @@ def test_rows_become_what_their_file_says() -> None:
     assert ROWS.read_text("utf-8") == cases(), "run: python -m tests.dialects, and review the changes"
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @each_row("row", table().rows)
 def test_rows_play_alike_live_and_offline_and_as_bml_1_0(row: Row) -> None:

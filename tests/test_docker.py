@@ -266,6 +266,7 @@ def test_install_script_prints_its_usage() -> None:
     assert "TARGET" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_install_script_installs_realizer_without_pip(installed: Path) -> None:
     assert (installed / "bin" / "realizer").is_file()

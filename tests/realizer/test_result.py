@@ -100,6 +100,7 @@ def test_repr_is_one_line(played: realizer.Realization) -> None:
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_repr_html_has_a_sheet_a_timeline_and_a_player(played: realizer.Realization) -> None:
     shown = played._repr_html_()

@@ -102,6 +102,7 @@ def drawing_pids(worker: Worker) -> list[int]:
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.long
 @pytest.mark.slow
 def test_worker_keeps_renderers_that_draw_the_same_in_any_order(
     tasks: list[Task], options: Options, monkeypatch: pytest.MonkeyPatch

@@ -58,6 +58,7 @@ def test_serve_refuses_an_unknown_camera_light_or_background(args: list[str], wo
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_light_and_background_are_visible_in_the_picture(tmp_path: Path) -> None:
     from PIL import Image

@@ -17,6 +17,7 @@ def sheet(*args: str) -> Result:
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_sheet_draws_archetypes_from_two_sides_with_differences(tmp_path: Path) -> None:
     path = tmp_path / "x.png"

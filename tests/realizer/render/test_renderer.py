@@ -233,6 +233,7 @@ def test_renderer_draws_transparent_pictures(way):
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_renderer_draws_another_light(renderer):
     with Renderer("default", SIZE, light="evening") as evening:

@@ -69,6 +69,7 @@ def test_references_refuse_wrong_labels(labels: str | None, said: str, photograp
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_matching_has_two_triples_of_each_reference_without_a_common_file() -> None:
     with Drawer() as draw:

@@ -163,6 +163,7 @@ def test_deformers_change_the_picture_at_the_same_place(renderers: dict[str, Ren
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_deformer_option_draws_a_still(renderers: dict[str, Renderer], tmp_path: Path) -> None:
     from PIL import Image

@@ -82,6 +82,7 @@ def test_fit_models_come_nearer_with_more_gaussians() -> None:
     assert len(models["extended"].units[1].motions["whole"].gaussians) <= 4
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_fit_command_fits_landmarks_and_prints_the_table(known: Model, tmp_path: Path) -> None:
     (tmp_path / "landmarks.csv").write_text(landmarks(known, (2,), 30))

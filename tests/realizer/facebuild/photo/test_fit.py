@@ -83,6 +83,7 @@ def test_fit_follows_the_outline_of_a_profile_to_either_side(data: Path) -> None
         assert fit.poses[1].size == pytest.approx(SCALE, rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_fit_says_that_there_is_no_outline(data: Path) -> None:
     _, at = person(data)

@@ -54,6 +54,7 @@ def test_expression_frame_tells_what_cooccurrence_leaves() -> None:
 
 
 @pytest.mark.gl("onboard")
+@pytest.mark.long
 @pytest.mark.slow
 def test_sheet_has_a_picture_of_each_expression() -> None:
     picture = Image.open(io.BytesIO(sheet("ada", SETTINGS)))

@@ -73,6 +73,7 @@ def test_engines_refuse_one_picture_too_many_and_draw_the_others(
 
 
 @pytest.mark.gl
+@pytest.mark.long
 @pytest.mark.slow
 def test_engines_keep_a_renderer_that_takes_long_to_start(
     engines, clock, monkeypatch: pytest.MonkeyPatch
