@@ -8,7 +8,6 @@ import math
 import re
 import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from typing import Any, Protocol
@@ -88,9 +87,8 @@ class Router:
         errors: errors about messages without an answer, and of video streams that ended.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self) -> None:
         self.receivers: dict[tuple[str, str | None], Receiver] = {}
-        self._clock = clock
         self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
         self.frames: dict[str, deque[Frame]] = {}
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
@@ -109,7 +107,7 @@ class Router:
             if receiver is None:
                 self.queue_of(frame.stream).append(frame)
             else:
-                receiver.receive(frame, self._clock())
+                receiver.receive(frame, time.monotonic())
         elif message.startswith("{"):
             reply = json.loads(message)
             if reply["type"] in JSON_STREAMS:

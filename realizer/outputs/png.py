@@ -24,18 +24,18 @@ class Moment:
     points: tuple[str, ...]
 
 
-def moments(realization: Realization, most: int = MOST) -> tuple[Moment, ...]:
+def moments(realization: Realization) -> tuple[Moment, ...]:
     """Choose frames for a sheet: the first, the last, those of sync points, and the middles of wide gaps.
 
-    If more than `most` frames have sync points, those closest to the one before are dropped.
+    If more than MOST frames have sync points, those closest to the one before are dropped.
     """
     count = len(realization.faps.times)
     points = _points(realization, count)
     chosen = sorted({0, count - 1, *points})
-    while len(chosen) > most:
+    while len(chosen) > MOST:
         gaps = np.diff(chosen[:-1])
         del chosen[int(np.argmin(gaps)) + 1]
-    wanted = min(most, count, max(LEAST, round(realization.duration / PACE)))
+    wanted = min(MOST, count, max(LEAST, round(realization.duration / PACE)))
     while len(chosen) < wanted:
         gaps = np.diff(chosen)
         widest = int(np.argmax(gaps))

@@ -135,11 +135,9 @@ def _stations(x: Float64, across: Float64) -> list[Float64]:
     return out
 
 
-def _soften(
-    ground: Ground, fields: dict[int, Float64], points: list[int], numbers: list[int], times: int = 2
-) -> None:
+def _soften(ground: Ground, fields: dict[int, Float64], points: list[int], numbers: list[int]) -> None:
     """Take the kinks off fields of one way, and mix them so that each leaves the others' points alone."""
-    soft = np.stack([ground.smoothed(fields[number], times) for number in numbers])
+    soft = np.stack([ground.smoothed(fields[number], 2) for number in numbers])
     mixed = np.linalg.solve(soft[:, points, 1].T, np.eye(len(points)))
     for k, number in enumerate(numbers):
         fields[number] = np.tensordot(mixed[:, k], soft, 1)
