@@ -211,7 +211,7 @@ def test_client_loads_no_engine() -> None:
     assert not heavy & {name.split(".")[0] for name in loaded}
 
 
-def test_a_document_is_realized_without_loading_what_draws_serves_or_writes() -> None:
+def test_document_is_realized_without_loading_what_draws_or_serves() -> None:
     speech = '<bml id="b"><speech id="s"><text>Hi.</text></speech></bml>'
     code = f"import sys, realizer; realizer.realize({speech!r}, voice='silent'); print(*sys.modules)"
     loaded = subprocess.run(

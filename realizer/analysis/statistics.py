@@ -7,7 +7,6 @@ import numpy as np
 
 from realizer import tables
 from realizer.emotions.profile import Profile
-from realizer.tables.emotions import statistics
 
 MIN_MEAN = 1.0  # FAPU; FAPs with a smaller mean are not part of an expression
 
@@ -37,16 +36,6 @@ def from_statistics(
             low, high = min(0.0, low), min(0.0, high)
         ranges[fap] = low, high
     return Profile(name, source, ranges)
-
-
-def published_statistics(emotion: str, raw: bool = False) -> dict[int, tuple[float, float]]:
-    """Return FAP -> (mean, deviation) of an emotion (table 4), as printed or with the signs of MPEG-4."""
-    found = {}
-    for row in statistics():
-        mean = row.raw_mean if raw else row.mean
-        if row.emotion == emotion and mean is not None and row.deviation is not None:
-            found[row.fap] = mean, row.deviation
-    return found
 
 
 def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Profile:

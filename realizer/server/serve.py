@@ -15,8 +15,7 @@ from realizer.core.logs import write_json
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
-from realizer.server.runtime.gc_policy import disable_automatic_gc
-from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_host import SessionHost, disable_automatic_gc
 from realizer.server.transports.transport import Transport, requested
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 

@@ -15,7 +15,6 @@ from typing import Any
 from realizer.core.atomic_files import write_text
 from realizer.study.items import ANSWERS, KINDS, WHEEL, Item
 
-LANGUAGES = ("en", "de", "pl")
 ITEMS, TEXTS, PAGE = "items.js", "texts.js", "index.html"
 SAVED = 1_000_000_000  # time of all files, in seconds, so that it does not tell in what order they were made
 

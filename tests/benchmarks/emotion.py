@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.analysis.faps_from_mesh import faps_from_mesh, features_from_mesh, measurable_profile
+from realizer.analysis.faps_from_mesh import faps_from_mesh
 from realizer.analysis.recognise import Recogniser, recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
@@ -29,6 +29,7 @@ from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.tables.emotions import emotion_model
+from tests.mesh_features import features_from_mesh, measurable_profile
 
 Counts = dict[str, Counter[str]]
 

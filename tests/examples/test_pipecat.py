@@ -58,7 +58,7 @@ def converse(python: Path) -> Iterator[Callable[..., dict[str, Any]]]:
 
 
 @pytest.mark.parametrize("options", [(), ("--foreign-voice",)])
-def test_face_stops_when_the_user_speaks_and_the_context_holds_what_was_heard(converse, options) -> None:
+def test_face_stops_when_the_user_speaks_and_the_context_has_the_rest(converse, options) -> None:
     each = converse(*options)
     story = "Once there was a face that talked and talked, and nobody could ever make it stop"
     (ask, asked), (who, heard), (_, stop), (_, last) = each["context"]

@@ -14,7 +14,6 @@ from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.journal.entry import Kind
 from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.connections import Connection, Connections
-from realizer.server.session.control_fields import FieldError
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.query_handlers import Query, QueryHandlers
 from realizer.server.session.tracked_faces import TrackedFaces
@@ -81,7 +80,7 @@ class Inbox:
         """Handle a message that is not written to the journal, except for the characters that it adds."""
         known = self.player.characters
         if isinstance(control, Track):
-            self._start_tracking(connection, control)
+            self.tracked.start(connection.id, control)
         elif isinstance(control, Query):
             self.queries.handle(connection, control, t)
         else:
@@ -89,12 +88,3 @@ class Inbox:
         for name in self.player.characters:
             if name not in known:  # their order matters: the first is the default
                 self.journal.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
-
-    def _start_tracking(self, connection: Connection, message: Track) -> None:
-        try:
-            self.tracked.start(connection.id, message)
-        except FieldError as error:
-            where = f"track.{error.where}"
-            self.connections.reply(
-                connection.id, ErrorMessage(code="invalid", message=str(error), where=where)
-            )

@@ -13,7 +13,7 @@ from realizer.protocol.messages.replies import ErrorMessage, Tracked
 from realizer.protocol.messages.requests import Track
 from realizer.protocol.wire import HEADER
 from realizer.server.session.connections import Connections
-from realizer.server.session.control_fields import character_index
+from realizer.server.session.control_fields import FieldError, character_index
 from realizer.server.session.effects import Look
 
 if TYPE_CHECKING:
@@ -51,16 +51,17 @@ class TrackedFaces:
     cameras: dict[int, _Camera] = field(default_factory=dict)  # by connection
 
     def start(self, connection: int, message: Track) -> None:
-        """Make a character follow the pictures of a connection; at 0 frames a second, no longer.
-
-        Raises:
-            FieldError: no such character.
-        """
+        """Make a character follow the pictures of a connection; at 0 frames a second, no longer."""
         from realizer.tracking.mirror import Mirror  # slow to load
 
         self.cameras.pop(connection, None)
         if message.fps:
-            character_index(self.player, message.character)
+            try:
+                character_index(self.player, message.character)
+            except FieldError as error:
+                answer = ErrorMessage(code="invalid", message=str(error), where=f"track.{error.where}")
+                self.connections.reply(connection, answer)
+                return
             self.cameras[connection] = _Camera(message.character, message.fps, Mirror())
 
     def drop(self, connection: int) -> None:

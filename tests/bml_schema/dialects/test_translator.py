@@ -214,7 +214,7 @@ def test_translate_of_mutated_documents_gives_blocks_that_can_be_written(data: s
             assert parse(write(found)) == found
 
 
-def test_translate_takes_linear_time_for_thousands_of_behaviours_without_ids() -> None:
+def test_translate_takes_linear_time_for_many_behaviours_without_ids() -> None:
     many = '<head type="NOD"/><face type="facs" au="1"/>' * 2000
     (block,) = read(f"<act><bml>{many}</bml></act>")
     assert isinstance(block, Block)

@@ -8,8 +8,6 @@ import pytest
 from realizer.analysis.faps_from_mesh import (
     faps_from_face,
     faps_from_mesh,
-    features_from_mesh,
-    measurable_profile,
     points_of,
 )
 from realizer.analysis.faps_from_points import facial_features
@@ -18,6 +16,7 @@ from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
+from tests.mesh_features import features_from_mesh, measurable_profile
 
 SEEDS = (0, 1, 2)
 

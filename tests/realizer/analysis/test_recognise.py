@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_mesh import features_from_mesh, measurable_profile, points_of
+from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import faps_from_points
 from realizer.analysis.recognise import Recogniser, emotion_of, recogniser
 from realizer.emotions.archetypes import archetypes
@@ -14,6 +14,7 @@ from realizer.emotions.words import emotion, known_words
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.tables.emotions import emotion_model, ring
+from tests.mesh_features import features_from_mesh, measurable_profile
 
 DRAWS = 60
 

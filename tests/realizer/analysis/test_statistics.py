@@ -5,8 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.statistics import from_faces, from_statistics, published_statistics
+from realizer.analysis.statistics import from_faces, from_statistics
 from realizer.emotions.archetypes import archetypes
+from realizer.tables.emotions import statistics
+
+
+def published_statistics(emotion: str, raw: bool = False) -> dict[int, tuple[float, float]]:
+    """Return FAP -> (mean, deviation) of an emotion (table 4), as printed or with the signs of MPEG-4."""
+    found = {}
+    for row in statistics():
+        mean = row.raw_mean if raw else row.mean
+        if row.emotion == emotion and mean is not None and row.deviation is not None:
+            found[row.fap] = mean, row.deviation
+    return found
 
 
 @pytest.mark.parametrize(("profiles", "raw"), [("raw", True), ("published", False)])

@@ -34,7 +34,7 @@ def seen(frames: AUFrames) -> dict[str, float]:
     return {name: weight for name, weight in weights(frames).items() if weight > 0.02}
 
 
-def test_shape_faps_of_closed_lips_undo_those_of_an_open_jaw_that_stays_open():
+def test_shape_faps_of_closed_lips_undo_those_of_a_jaw_that_stays_open():
     shapes = dict(zip(ARKIT_NAMES(), shape_faps(None), strict=True))
     left = np.flatnonzero(shapes["mouthClose"] + shapes["jawOpen"]) + 1
     assert 3 in left

@@ -131,7 +131,7 @@ def test_guarded_behaviour_keeps_its_own_faults() -> None:
     assert checked(check=lambda node, context: (own,)) == (own,)
 
 
-def test_guarded_behaviour_that_fails_later_does_not_move_and_is_logged_once(caplog) -> None:
+def test_guarded_behaviour_that_fails_later_rests_and_is_logged_once(caplog) -> None:
     kind = guarded(replace(KIND, expand=fail), "later")
     for _ in range(2):
         assert kind.expand(SMILE, None, None) == ()

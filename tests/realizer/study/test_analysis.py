@@ -100,7 +100,7 @@ def test_comparisons_find_the_better_variant(tmp_path: Path) -> None:
     assert 0.4 < shown["from"] < 2 / 3 < shown["to"] < 0.9
 
 
-def test_tables_keep_machines_and_people_apart_and_leave_out_the_inattentive(tmp_path: Path) -> None:
+def test_tables_keep_machines_apart_and_leave_out_the_inattentive(tmp_path: Path) -> None:
     check = Item("visual", {"check": "none"}, {}, {"right": picture(1)}, check="none")
     found = key([*matches(2), check])
     rows = [line(found, f"i{k}", role, 1) for k, role in enumerate(("right", "right", "none"))]

@@ -55,7 +55,7 @@ def test_tracks_give_one_time_of_the_session_one_timestamp() -> None:
     assert heard == pytest.approx(seen, abs=0.001)
 
 
-def test_sound_track_is_silent_between_packets_and_forgets_what_is_taken_back() -> None:
+def test_sound_track_is_silent_between_packets_and_forgets_sound() -> None:
     async def act(playout: Playout) -> list[int]:
         track = SoundTrack(playout)
         for number in (0, 1, 3):
