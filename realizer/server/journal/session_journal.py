@@ -87,9 +87,8 @@ class JournalWriter:
             self._entries += 1
             self._bytes += len(entry.body)
             if self._entries % ENDLESS == 0:
-                words = "some block always plays or waits"
-                args = self._session, self._entries, words
-                log.warning("session %s: %d entries in its journal and no checkpoint: %s", *args)
+                words = "session %s: %d entries in its journal and no checkpoint: some block always plays or waits"
+                log.warning(words, self._session, self._entries)
             if self._follow is not None and not self._follow():
                 self._follow = None
         self._record(lambda recorder: recorder.add(self._session, entry))
