@@ -87,7 +87,7 @@ class JournalWriter:
             self._entries += 1
             self._bytes += len(entry.body)
             if self._entries % ENDLESS == 0:
-                words = "session %s: %d entries in its journal and no checkpoint: some block always plays or waits"
+                words = "session %s: no checkpoint after %d entries: some block always plays or waits"
                 log.warning(words, self._session, self._entries)
             if self._follow is not None and not self._follow():
                 self._follow = None
