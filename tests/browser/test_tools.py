@@ -221,6 +221,32 @@ def test_timeline_scrubs_by_mouse_and_keyboard(page) -> None:  # type: ignore[no
     assert page.locator("#live").is_hidden()
 
 
+def test_timeline_shows_whole_rows_and_whole_words(page) -> None:  # type: ignore[no-untyped-def]
+    page.fill(
+        "#document",
+        '<bml id="w"><speech id="s"><text>Hello there, it is nice to see you.</text></speech></bml>',
+    )
+    page.click("#play")
+    page.wait_for_selector("#score .word:has-text('you')")
+    words = """() => [...document.querySelectorAll('#score .word')].map((word) => {
+      const { left, right, top, bottom } = word.getBoundingClientRect();
+      return { left, right, top, bottom, whole: word.scrollWidth <= word.clientWidth };
+    })"""
+    boxes = page.evaluate(words)
+    assert all(box["whole"] for box in boxes)
+    for one in boxes:
+        for other in boxes:
+            apart = one["right"] <= other["left"] + 0.5 or one["bottom"] <= other["top"] + 0.5
+            assert (
+                one is other
+                or apart
+                or other["right"] <= one["left"] + 0.5
+                or other["bottom"] <= one["top"] + 0.5
+            )
+    row = "document.querySelector('#score .track:not(.speech)')?.offsetHeight ?? 24"
+    assert page.evaluate("document.getElementById('score').clientHeight") % page.evaluate(row) == 0
+
+
 # what is held -------------------------------------------------------------------------------------
 
 
@@ -235,6 +261,18 @@ def test_sliders_set_action_units_on_both_sides_or_one(page) -> None:  # type: i
     page.click("#neutral")
     shown(page, au12L=0, au12R=0)
     page.click("button[aria-label='AU 12: both sides together']")
+
+
+def test_sliders_show_what_an_emotion_moves(page) -> None:  # type: ignore[no-untyped-def]
+    page.click("#tab-aus")
+    page.evaluate("realizerPage.pose.set({ emotion: { name: 'sadness' } })")
+    left = page.locator("#au-sliders input[aria-label='AU 1 Inner brow raiser, left']")
+    page.wait_for_function("(input) => Number(input.value) > 0.5", arg=left.element_handle())
+    assert page.locator(".row.au.held").count() == 0
+    slide(page, "AU 1 Inner brow raiser, left", 0.3)
+    assert page.locator(".row.au.held").count() == 1
+    page.click("#neutral")
+    page.wait_for_function("(input) => Number(input.value) === 0", arg=left.element_handle())
 
 
 def test_sliders_are_found_by_number_and_name(page) -> None:  # type: ignore[no-untyped-def]

@@ -19,6 +19,7 @@ import { Wheel } from "./wheel.js";
 
 const MESH_RATE = 30; // frames a second; the page draws between them
 const CURVE_RATE = 25; // frames a second
+const LOOK = 100; // ms between looks of the sliders at the face
 const AHEAD = 0.2; // s; curves are sent so long before their time
 const AGAIN = 3000; // ms until what a busy service did not send is asked for again
 const BLOCK = /(<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*)(["'])(.*?)\2/;
@@ -44,6 +45,7 @@ const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
 const alive = new Set(); // ids of blocks that were accepted and have not ended
 let plays = 0;
+let looked = 0; // ms, when the sliders last looked at the face
 let face = null;
 let faces = []; // names of the service's faces
 let faults = [];
@@ -175,6 +177,10 @@ function draw() {
   const designed = design.frames();
   if (room.open) room.draw(performance.now());
   else stage.draw(designed?.time ?? timeline.scrub ?? now, recorder.on, designed?.frames);
+  if (now !== null && performance.now() - looked > LOOK) {
+    looked = performance.now();
+    for (const [sliders, tracks] of [[units, timeline.kinds.au], [params, timeline.kinds.fap]]) sliders.see(tracks?.at(timeline.scrub ?? now) ?? {});
+  }
   if (recorder.on) {
     recorder.draw();
     at("record").lastElementChild.textContent = `Stop ${recorder.seconds.toFixed(0)} s`;

@@ -1,4 +1,4 @@
-// Sliders for every action unit and side, and for every FAP; they show the values that the pose holds.
+// Sliders for every action unit and side, and for every FAP; they show what the pose holds, else what the face does.
 import { make } from "./dom.js";
 
 const NEAR = 1024; // FAPU: range of a slider; the number beside it accepts the whole range of the table
@@ -7,7 +7,7 @@ const ANGLES = 100_000; // 1e-5 rad: range of eyes and head
 // Rows under headings, and a search field.
 class Sliders {
   constructor(panel, search, pose) {
-    Object.assign(this, { panel, pose, rows: [] });
+    Object.assign(this, { panel, pose, rows: [], seen: {} });
     search.oninput = () => this.find(search.value.trim().toLowerCase());
     pose.addEventListener("change", () => this.refresh());
   }
@@ -32,6 +32,12 @@ class Sliders {
     for (const row of this.rows) row.element.hidden = !row.words.includes(words);
     for (const group of this.panel.children) group.hidden = [...group.querySelectorAll(".row")].every((row) => row.hidden);
     this.panel.classList.toggle("none", this.rows.every((row) => row.element.hidden));
+  }
+
+  // Show what the face does: name -> value of a frame.
+  see(values) {
+    this.seen = values;
+    if (this.panel.offsetParent) this.refresh();
   }
 
   refresh() {
@@ -84,11 +90,10 @@ export class ActionUnits extends Sliders {
     const element = make("div.row.au", {}, make("b", {}, String(au)), make("span", { title: name }, name), ...(sides ? [inputs[0], link, inputs[1]] : inputs), value);
     if (!sides) element.classList.add("middle");
     const refresh = () => {
-      const held = names.map((one) => pose.aus.get(one) ?? 0);
-      inputs.forEach((input, k) => show(input, held[k]));
-      element.classList.toggle("held", held.some(Boolean));
-      const words = held.map((x) => Math.round(100 * x));
-      value.textContent = held.some(Boolean) ? (words[0] === words.at(-1) ? `${words[0]}` : words.join(" | ")) : "";
+      const words = names.map((one) => Math.round(100 * (pose.aus.get(one) ?? this.seen[one] ?? 0)));
+      inputs.forEach((input, k) => show(input, words[k] / 100));
+      element.classList.toggle("held", names.some((one) => pose.aus.has(one)));
+      value.textContent = words.some(Boolean) ? [...new Set(words)].join(" | ") : "";
     };
     return { element, refresh, words: `au${au} ${au} ${name}`.toLowerCase() };
   }
@@ -110,9 +115,9 @@ export class Faps extends Sliders {
     number.onchange = () => set(Math.min(most, Math.max(least, Number(number.value) || 0)));
     const element = make("div.row.fap", {}, make("b", {}, String(fap)), make("span", { title: `${name}, in ${unit}` }, words), input, number);
     const refresh = () => {
-      const held = pose.faps.get(name) ?? 0;
-      show(input, held);
-      if (document.activeElement !== number || Number(number.value) !== held) number.value = Math.round(held);
+      const value = Math.round(pose.faps.get(name) ?? this.seen[name] ?? 0);
+      show(input, value);
+      if (document.activeElement !== number) number.value = value;
       element.classList.toggle("held", pose.faps.has(name));
     };
     return { element, refresh, words: `f${fap} ${fap} ${words}` };

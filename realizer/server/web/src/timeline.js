@@ -6,6 +6,8 @@ const AFTER = 0.6; // s shown after a block's end
 const LEAST = 2; // s
 const CURVES = 0.25; // s between choices of the curves that move most
 const BLOCKS = 12; // in memory
+const WORD = 6; // px beside a word
+const PEN = Object.assign(document.createElement("canvas").getContext("2d"), { font: "11px system-ui, sans-serif" }); // as .word
 const OVER = /DONE|INTERRUPTED|FAILED|REVOKED/;
 const STEP = 0.1; // s of an arrow key
 const POINTS = 10; // px between lines of the ruler, at least, times the length of its labels
@@ -20,6 +22,7 @@ export class Timeline {
     this.head = make("div.head", {}, make("output"));
     this.slider = make("div.scrub", { role: "slider", tabIndex: 0, ariaLabel: "Time; arrow keys look at the past, End comes back to now" });
     panel.replaceChildren(make("div.sheet", {}, this.ruler, this.lines, this.curves, this.slider, this.head));
+    new ResizeObserver(() => (this.stale = true)).observe(panel);
     this.slider.onpointerdown = (event) => {
       this.slider.setPointerCapture(event.pointerId);
       this.touch(event);
@@ -136,10 +139,15 @@ export class Timeline {
           lane.append(bar("planned", place, Math.min(...times), Math.max(...times)));
           lane.append(...planned.map(({ name, at }) => tick("tick", place(at), `${name}: scheduled ${(at - current.start).toFixed(2)} s`)));
         }
-        for (const { start, end, text } of line.words ?? []) {
-          const word = make("span.word", { title: text }, text);
+        // Words have two rows; one that has no room on them is left out.
+        const free = [-Infinity, -Infinity];
+        for (const { start, text } of line.words ?? []) {
+          const left = (this.slider.clientWidth * (current.start + start - from)) / (to - from);
+          const row = free.findIndex((end) => end <= left);
+          if (row < 0) continue;
+          const word = make(row ? "span.word.low" : "span.word", {}, text);
           word.style.left = place(current.start + start);
-          word.style.width = `${(100 * (end - start)) / (to - from)}%`;
+          free[row] = left + PEN.measureText(text).width + WORD;
           lane.append(word);
         }
         if (happened.length) {
