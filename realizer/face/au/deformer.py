@@ -44,12 +44,17 @@ def _orderly(model: Model) -> list[int]:
 
 def _units(model: Model) -> list[tuple[tuple[int, str], tuple[str, ...]]]:
     """Return (unit, side) -> the names of the columns that show it, ascending."""
-    sided = {row.au: row.sides for row in action_units()}
     return [
         ((au, side), tuple(f"{name}{side}" for name in units()[au].names))
-        for au in sorted(model.units)
-        for side in (("L", "R") if sided[au] else ("",))
+        for number in sorted(model.units)
+        for au, side in side_names(number)
     ]
+
+
+def side_names(au: int) -> list[tuple[int, str]]:
+    """Return (unit, "L") and (unit, "R"), or (unit, "") for one that has no sides."""
+    sided = any(row.sides for row in action_units() if row.au == au)
+    return [(au, side) for side in (("L", "R") if sided else ("",))]
 
 
 class Moves:
@@ -79,7 +84,7 @@ class Moves:
             (au, *(names.index((au, side)) for side in (("L", "R") if (au, "L") in names else ("", ""))))
             for au in _orderly(model)
         ]
-        moves = _displacements(face, model, names)
+        moves = displacements(face, model, names)
         found = np.flatnonzero(moves.any(axis=(0, 2)))
         first, last = (int(found[0]), int(found[-1]) + 1) if len(found) else (0, 0)
         self.moving = slice(first, last)
@@ -88,9 +93,6 @@ class Moves:
             return csr_matrix(rows[:, self.moving].reshape(len(rows), -1).T.astype(np.float32))
 
         closes = np.array([au == CLOSE for au, _ in names])
-        for row, (au, side) in zip(moves, names, strict=True):
-            if au == CLOSE:
-                row *= _meeting(face, row, side)
         self._closing, self._rest = np.flatnonzero(closes), np.flatnonzero(~closes)
         self._close, self._move = matrix(moves[closes]), matrix(moves[~closes])
         self._sides = np.array(["LR".index(side) for au, side in names if au == CLOSE], np.intp)
@@ -176,8 +178,11 @@ def moves_of(face: Face) -> Moves | None:
     return None if face.model is None else Moves(face, face.model)
 
 
-def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
-    """Return the displacements with full intensity, (units, n_vertices, 3) metres."""
+def displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Float64:
+    """Return the displacements by units and sides (`side_names`), (names, n_vertices, 3) metres.
+
+    Lids that close meet: see `_meeting`. `ActionUnit.strength` is not in them.
+    """
     at = face.vertices.astype(np.float64)
     mine = skin(face)
     upper = shares(face, model.mouth)
@@ -188,6 +193,9 @@ def _displacements(face: Face, model: Model, names: list[tuple[int, str]]) -> Fl
     for first, last, corners, share in attached_parts(face):
         moves[:, first:last] = np.einsum("nk,ankc->anc", share, moves[:, corners])
     moves[np.abs(moves).max(axis=2) < MIN_MOVE] = 0
+    for row, (au, side) in zip(moves, names, strict=True):
+        if au == CLOSE:
+            row *= _meeting(face, row, side)
     return moves
 
 

@@ -13,6 +13,8 @@ from realizer.face.au.units import units
 from realizer.face.reading import face_errors, read_arrays
 from realizer.tables import read_csv
 
+OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
+COLLAR = -0.16  # m; below it no face moves
 FINE = 1e-5  # m; the shapes are stored in whole multiples of it
 ARRAYS = {"at": 2, "seen": 1, "upper": 1, "au": 1, "moves": 3}
 FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided

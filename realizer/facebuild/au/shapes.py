@@ -18,7 +18,7 @@ from realizer.face.mesh_geometry import (
     vertex_normals,
 )
 from realizer.face.model import Face
-from realizer.facebuild.au.measure import UnitMeasurement
+from realizer.facebuild.au.measure import COLLAR, OPEN, UnitMeasurement
 from realizer.facebuild.parts import Submesh
 from realizer.facebuild.person import makehuman
 from realizer.facebuild.person.lips import Lips
@@ -27,8 +27,6 @@ from realizer.facebuild.person.person import person_of
 from realizer.facebuild.person.recipe import read_recipe
 from realizer.facebuild.photo.warp import read_warp
 
-OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
-COLLAR = -0.16  # m; below it no face moves
 EVEN = np.array([-1.0, 1.0, 1.0])
 OFF = 5e-4  # m; added and cut vertices lie no farther than this off the base mesh
 AROUND = 32  # number of nearest triangles to look at

@@ -1,6 +1,7 @@
 """What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -8,17 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from realizer.face.features import read_features
-from realizer.face.load import load_folder
+from realizer.face.au.units import units
+from realizer.face.features import NAMES, Point, read_features
+from realizer.face.load import MESH, load_folder, read_head
+from realizer.face.mesh_geometry import nearest_vertex
+from realizer.face.reading import read_arrays
 from realizer.facebuild.mpeg4 import rigid
 from realizer.facebuild.mpeg4.build import grown, setup_of
 from realizer.facebuild.mpeg4.defaults import default_setup
 from realizer.facebuild.mpeg4.fap_limits import usual_range
 from realizer.facebuild.mpeg4.fields import WAYS, pairs
-from realizer.facebuild.mpeg4.landmarks import template
+from realizer.facebuild.mpeg4.landmarks import PUPILS, TEETH, template
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup, setup_table
-from realizer.facebuild.mpeg4.zones import mirrorable
-from realizer.tables import csv_rows, faps
+from realizer.facebuild.mpeg4.zones import Setup, mirrorable
+from realizer.tables import action_units, csv_rows, faps
 
 FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # what a face's name has not
 
@@ -89,4 +93,29 @@ def _tables() -> dict[str, Any]:
     marks = {name: place.round(4).tolist() for name, place in template()[0].items()}
     says = {row.name: row.says for row in csv_rows("point_names.csv", _PointName, __package__)}
     links = [[pair.one, pair.other] for pair in pairs()]
-    return {"faps": rows, "pairs": links, "template": marks, "says": says}
+    names = {row.au: row.name for row in action_units()}
+    displaced = [[unit.au, names[unit.au]] for unit in units().values() if unit.kind == "displacement"]
+    return {"faps": rows, "pairs": links, "template": marks, "says": says, "units": displaced}
+
+
+def placed_points(folder: Path, places: Mapping[str, Any]) -> dict[str, Point]:
+    """Return the feature points at their new places, each with the nearest vertex of its part."""
+    parts = read_head(folder)["parts"]
+    at = np.asarray(read_arrays(folder / "mesh.npz", MESH)["vertices"], np.float64)
+    out = read_features(folder / "features.csv")
+    for name, place in places.items():
+        if name not in NAMES:
+            raise FaceError(f"points: wanted feature points such as 2.1, got {name[:40]!r}")
+        if np.abs(np.array(place) - out[name].place).max() < 1e-7:
+            continue
+        part = PUPILS.get(name) or TEETH.get(name, ("skin",))[0]
+        part = "tongue" if name.startswith("6.") else part
+        first, last = parts.get(part, parts["skin"])
+        out[name] = Point(name, nearest_vertex(at, place, (first, last)), *place)
+    return out
+
+
+def is_here(setup: Setup, points: Mapping[str, Any]) -> bool:
+    """Return whether the points of a file are those of the head: then its numbers stay as they are."""
+    shared = set(setup.points) & set(points)
+    return bool(shared) and all(np.allclose(setup.points[k], points[k], atol=2e-6) for k in shared)

@@ -4,7 +4,7 @@ import errno
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -15,19 +15,18 @@ from realizer.core.atomic_files import lock
 from realizer.core.errors import FaceError, RealizerError
 from realizer.face.basis import FAPS
 from realizer.face.deform import deform
-from realizer.face.features import NAMES, Point, read_features, write_features
-from realizer.face.load import MESH, face_folders, load_folder, read_head
-from realizer.face.mesh_geometry import nearest_vertex
+from realizer.face.features import read_features, write_features
+from realizer.face.load import DEFORMERS, MESH, face_folders, load_folder
 from realizer.face.model import Face
 from realizer.face.reading import read_arrays
 from realizer.facebuild.mpeg4.build import FILES, copy_with_zones
 from realizer.facebuild.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
 from realizer.facebuild.mpeg4.fap_scores import mean_score, score_faps
-from realizer.facebuild.mpeg4.landmarks import PUPILS, TEETH
 from realizer.facebuild.mpeg4.parameters import FILE, read_setup, setup_from, setup_table, write_setup
-from realizer.facebuild.mpeg4.zones import Setup
 from realizer.facebuild.studio.bare_head import import_bare
-from realizer.facebuild.studio.head_message import FACE_NAME, head_message
+from realizer.facebuild.studio.head_message import FACE_NAME, head_message, is_here, placed_points
+from realizer.facebuild.studio.unit_fits import FILES as UNIT_FILES
+from realizer.facebuild.studio.unit_fits import UnitFits
 from realizer.server.edits.edit_folder import LOCK, NAME
 from realizer.server.edits.packed_messages import packed, unpacked
 from realizer.server.http.face_glb import face_glb
@@ -48,6 +47,7 @@ class Studio:
         self._place = TemporaryDirectory(prefix="realizer-face-")
         self._head: Path | None = None
         self._count = 0
+        self._fits: dict[str, UnitFits] = {}
 
     def close(self) -> None:
         """Remove the folders."""
@@ -66,7 +66,7 @@ class Studio:
             kinds = {
                 "open": self._open, "import": self._import, "score": self._score, "pose": self._pose,
                 "field": self._field, "xml": self._xml, "read": self._read, "glb": self._glb,
-                "save": self._save,
+                "save": self._save, "unit": self._unit,
             }  # fmt: skip
             if asked.get("type") not in kinds:
                 raise FaceError(
@@ -85,7 +85,7 @@ class Studio:
         if name not in (known := face_folders(self._edit)):
             raise FaceError(f"face: wanted one of {', '.join(known)}, got {name[:80]!r}")
         folder = self._new(name)
-        for file in FILES:
+        for file in (*FILES, *UNIT_FILES):
             if (known[name] / file).is_file():
                 shutil.copy(known[name] / file, folder / file)
         return self._opened(folder, (), _version(known[name]))
@@ -102,7 +102,7 @@ class Studio:
         return self._opened(folder, words, "")
 
     def _opened(self, folder: Path, words: tuple[str, ...], version: str) -> Any:
-        self._head = folder
+        self._head, self._fits = folder, {}
         guesses = [word.removeprefix("guess ") for word in words if word.startswith("guess ")]
         notes = [word for word in words if not word.startswith("guess ")]
         header, arrays = head_message(folder)
@@ -127,7 +127,7 @@ class Studio:
         work = self._new(folder.name)
         try:
             shutil.copytree(source, work, dirs_exist_ok=True)
-            write_features(work / "features.csv", _points(work, setup.points))
+            write_features(work / "features.csv", placed_points(work, setup.points))
             (work / FILE).unlink(missing_ok=True)
             parameters = work / "zones.toml"
             write_setup(parameters, setup)
@@ -173,6 +173,26 @@ class Studio:
         out[first:last] = face.basis["fields"][:, fap - 1].toarray().reshape(-1, 3)
         return {}, {"field": out}
 
+    def _unit(self, asked: dict[str, Any], _: bytes) -> Any:
+        """Return the markers, the errors and the field of an action unit, fitted to `markers` if there are."""
+        return self._units(asked).unit(asked.get("au"), asked.get("markers"))
+
+    def _units(self, asked: dict[str, Any]) -> UnitFits:
+        """Return the action units of the head with the feature points of the page, kept for these points."""
+        folder, setup = self._source(), setup_from("setup", _table(asked))
+        # A face with a model keeps the mouth of that.
+        places = {} if (folder / UNIT_FILES[1]).is_file() else setup.points
+        key = json.dumps({name: list(place) for name, place in places.items()})
+        if key not in self._fits:
+            found = placed_points(folder, places)
+            face = replace(
+                load_folder(folder, "mpeg4"),
+                points={name: np.array(point.place, np.float32) for name, point in found.items()},
+                feature_points={name: point.vertex for name, point in found.items()},
+            )
+            self._fits = {key: UnitFits(folder, face)}
+        return self._fits[key]
+
     def _xml(self, asked: dict[str, Any], _: bytes) -> Any:
         with TemporaryDirectory() as place:
             lost = write_faceeditor(Path(place) / "zones.xml", setup_from("setup", _table(asked)))
@@ -187,7 +207,7 @@ class Studio:
             path.write_bytes(payload)
             try:
                 setup = read_setup(path) if path.suffix == ".toml" else read_faceeditor(path)
-                if path.suffix != ".toml" and not _is_here(setup, points):
+                if path.suffix != ".toml" and not is_here(setup, points):
                     setup = fitted(setup, points)
             except FaceError as error:
                 raise FaceError(str(error).replace(str(path), file)) from None
@@ -223,7 +243,9 @@ class Studio:
                     f"{FACES}/{name} is there already, or was saved by somebody else since you opened it", now
                 )
             made = self._made(asked, Path(place) / name)
-            load_folder.__wrapped__(made, "mpeg4")  # never save what cannot be loaded
+            self._units(asked).write(made, asked.get("units") or {})
+            for deformer in DEFORMERS[: 2 if (made / UNIT_FILES[1]).is_file() else 1]:
+                load_folder.__wrapped__(made, deformer)  # never save what cannot be loaded
             if target.exists():
                 target.rename(Path(place) / "before")
             made.rename(target)
@@ -246,33 +268,10 @@ def _table(asked: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
-def _points(folder: Path, places: Mapping[str, Any]) -> dict[str, Point]:
-    """Return the feature points at their new places, each with the nearest vertex of its part."""
-    parts = read_head(folder)["parts"]
-    at = np.asarray(read_arrays(folder / "mesh.npz", MESH)["vertices"], np.float64)
-    out = read_features(folder / "features.csv")
-    for name, place in places.items():
-        if name not in NAMES:
-            raise FaceError(f"points: wanted feature points such as 2.1, got {name[:40]!r}")
-        if np.abs(np.array(place) - out[name].place).max() < 1e-7:
-            continue
-        part = PUPILS.get(name) or TEETH.get(name, ("skin",))[0]
-        part = "tongue" if name.startswith("6.") else part
-        first, last = parts.get(part, parts["skin"])
-        out[name] = Point(name, nearest_vertex(at, place, (first, last)), *place)
-    return out
-
-
-def _is_here(setup: Setup, points: Mapping[str, Any]) -> bool:
-    """Return whether the points of a file are those of the head: then its numbers stay as they are."""
-    shared = set(setup.points) & set(points)
-    return bool(shared) and all(np.allclose(setup.points[k], points[k], atol=2e-6) for k in shared)
-
-
 def _version(folder: Path) -> str:
     """Return a name of what a face folder contains, or "" if there is none."""
     digest = hashlib.sha256()
-    for file in ("features.csv", FILE, "fields.npz"):
+    for file in ("features.csv", FILE, "fields.npz", *UNIT_FILES):
         if (folder / file).is_file():
             digest.update((folder / file).read_bytes())
     return digest.hexdigest()[:16] if folder.is_dir() else ""

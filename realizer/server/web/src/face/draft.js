@@ -1,4 +1,4 @@
-// The feature points, zones and masks that are edited: every change can be undone, and a draft stays in the browser.
+// The feature points, zones, masks and markers of action units that are edited: every change can be undone, and a draft stays in the browser.
 
 const SAVED = 400; // ms after a change a draft is kept
 const FAR = 0.03; // distances of the eyes; two points of the template that mirror each other lie so near
@@ -38,9 +38,9 @@ export class Draft extends EventTarget {
     if (kept) this.change("Resume", () => this.stateOf(kept));
   }
 
-  stateOf({ points, zone, masks, synced, joined, whole, by, asked = [] }) {
+  stateOf({ points, zone, masks, synced, joined, whole, by, asked = [], units = {} }) {
     return {
-      points,
+      points, units,
       zones: new Map(zone.map((one) => [one.fap, Object.fromEntries(Object.entries(one).map(([name, x]) => [name, rounded(x)]))])),
       masks: new Map(Object.entries(masks).flatMap(([faps, ranges]) => faps.split(" ").map((fap) => [Number(fap), expanded(ranges, this.mesh.count)]))),
       synced: new Set(synced), by: new Set(by), asked, joined, whole,
@@ -49,7 +49,7 @@ export class Draft extends EventTarget {
 
   // The state as the table of the service; `all`: with zones that move nothing yet.
   table(all = false) {
-    const { points, zones, masks, synced, by, asked, joined, whole } = this.state;
+    const { points, zones, masks, synced, by, asked, joined, whole, units } = this.state;
     const used = (fap) => all || by.has(fap);
     const table = {
       points, joined, whole,
@@ -57,7 +57,7 @@ export class Draft extends EventTarget {
       zone: [...zones.values()].filter(({ fap }) => used(fap)),
       masks: Object.fromEntries([...masks].filter(([fap]) => used(fap)).map(([fap, mask]) => [fap, ranges(mask)])),
     };
-    return all ? { ...table, by: [...by], asked } : table;
+    return all ? { ...table, by: [...by], asked, units } : table;
   }
 
   // The zones that move the face, as fieldOf takes them.

@@ -3,6 +3,8 @@ import { coupled, fapuOf, keepLids, lidsOf } from "./deform.js";
 import { fieldOf } from "./zones.js";
 
 const LIDS = new Set([19, 20, 21, 22]);
+export const UNIT = "unit"; // in the place of a FAP: the action unit that the tab shows
+const JAW = ["lower_teeth", "tongue"];
 const EYEBALLS = new Set([27, 28]); // the service moves what lies behind the lids, too
 
 export class Motion {
@@ -12,6 +14,7 @@ export class Motion {
   }
 
   begin() {
+    this.unit = null;
     this.shapes = new Map(); // FAP -> the head's own field
     this.lists = new WeakMap();
     this.at = this.written = this.changed = null; // numbers: of all, moved, and moved or moved back
@@ -28,13 +31,21 @@ export class Motion {
     Object.assign(this, { fap, value, pending: true });
   }
 
+  // Show an action unit with an intensity: { field, lids, jaw } of the service; null: none yet.
+  show(unit, value) {
+    if (unit?.field !== this.unit?.field) this.lids = null;
+    this.unit = unit;
+    this.test(UNIT, unit ? value : 0);
+  }
+
   // Whether a FAP has a field; jaw, tongue, eyeballs and head have none.
   has(fap) {
-    return this.draft.state.zones.has(fap) && !EYEBALLS.has(fap);
+    return fap === UNIT || (this.draft.state.zones.has(fap) && !EYEBALLS.has(fap));
   }
 
   // What is shown of a FAP, in metres for each metre of its point; null until it is known.
   field(fap) {
+    if (fap === UNIT) return (this.unit ??= { field: new Float64Array(this.draft.mesh.vertices.length) }).field;
     if (!this.own && this.draft.state.by.has(fap)) return this.fields.get(fap) ?? null;
     if (!this.shapes.has(fap)) {
       this.shapes.set(fap, null);
@@ -47,6 +58,11 @@ export class Motion {
     return this.shapes.get(fap);
   }
 
+  // Whether what is shown moves lids, which slide over the eyeballs.
+  get blinks() {
+    return LIDS.has(this.fap) || (this.fap === UNIT && this.unit?.lids);
+  }
+
   get moving() {
     return coupled(this.fap, this.value, this.draft.state.points, this.draft.rows).filter(([fap, value]) => fap === this.fap || value);
   }
@@ -55,7 +71,7 @@ export class Motion {
   step(budget) {
     if (!this.pending || !this.draft.mesh) return null;
     if (!this.has(this.fap)) return this.remote();
-    const wanted = [...this.moving.map(([fap]) => fap), ...(LIDS.has(this.fap) ? LIDS : [])];
+    const wanted = [...this.moving.map(([fap]) => fap), ...(this.blinks ? LIDS : [])];
     const end = performance.now() + budget;
     for (const fap of wanted) {
       const mine = !this.own && this.draft.state.by.has(fap);
@@ -91,19 +107,34 @@ export class Motion {
     this.written = [];
     const units = fapuOf(this.draft.state.points);
     for (const [fap, value] of this.value ? this.moving : []) {
-      const [field, far] = [this.field(fap), value * units[this.draft.rows.get(fap).unit]];
+      const [field, far] = [this.field(fap), value * (fap === UNIT ? 1 : units[this.draft.rows.get(fap).unit])];
       const moved = this.moved(field);
       for (const i of moved) at[i] += far * field[i];
       this.written.push(moved);
     }
     this.written = this.written.length === 1 ? this.written[0] : this.written.flat();
-    if (this.value && LIDS.has(this.fap)) {
+    if (this.value && this.fap === UNIT && this.unit.jaw?.[3]) this.written = [...this.written, ...this.turnJaw(at)];
+    if (this.value && this.blinks) {
       this.lids ??= lidsOf(this.draft.mesh, (fap) => this.field(fap));
       keepLids(this.lids, at);
       this.written = [...this.written, ...this.lids.map(({ i }) => 3 * i + 2)];
     }
     this.changed = [...before, ...this.written];
     return at;
+  }
+
+  // Turn what hangs at the jaw, and return the numbers that are written.
+  turnJaw(at) {
+    const [, y, z, angle] = this.unit.jaw;
+    const [c, s] = [Math.cos(this.value * angle), Math.sin(this.value * angle)];
+    const written = [];
+    for (const part of JAW)
+      for (let [i, last] = this.draft.mesh.parts[part] ?? [0, 0]; i < last; i++) {
+        const [up, front] = [at[3 * i + 1] - y, at[3 * i + 2] - z];
+        [at[3 * i + 1], at[3 * i + 2]] = [y + c * up - s * front, z + s * up + c * front];
+        written.push(3 * i + 1, 3 * i + 2);
+      }
+    return written;
   }
 
   // The numbers of a field that are not zero.

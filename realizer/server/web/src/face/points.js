@@ -1,8 +1,7 @@
 // The 84 feature points: markers on the head, the list, and the point that is asked for next.
 import { make } from "../dom.js";
+import { Marks } from "./marks.js";
 
-const STEP = 0.0005; // m that an arrow key moves a point; with Shift ten times as far
-const WAYS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 const INSIDE = new Set(["7.1", "11.5"]); // points that lie on no skin
 // Lines of the small drawing, from point to point of the template.
 const LINES = ["11.4 11.2 10.10 10.2 10.6 2.14 2.12 2.1 2.11 2.13 10.5 10.1 10.9 11.3 11.4", "4.6 4.4 4.2", "4.5 4.3 4.1", "3.12 3.2 3.8 3.4 3.12", "3.7 3.1 3.11 3.3 3.7", "8.4 8.6 8.10 8.1 8.9 8.5 8.3 8.7 8.2 8.8 8.4", "2.5 2.7 2.2 2.6 2.4 2.8 2.3 2.9 2.5", "9.1 9.15 9.2", "9.6 9.13", "9.7 9.14"];
@@ -11,7 +10,7 @@ const PROFILE = ["11.4 11.1 9.12 9.3 9.15 8.1 2.2", "2.3 8.2 2.10 2.1 2.13 10.7 
 export class Points {
   // layer: the element over the canvas; panel: the one of the tab; said(text): a note.
   constructor(panel, layer, draft, view, said) {
-    Object.assign(this, { panel, layer, draft, view, said, chosen: "2.1", marks: new Map() });
+    Object.assign(this, { panel, draft, view, said, chosen: "2.1", marks: new Marks(layer, view, this) });
     const button = (text, click) => Object.assign(make("button", { type: "button" }, text), { onclick: click });
     this.front = make("div.face-drawing");
     this.question = make("p", { role: "status" });
@@ -26,20 +25,13 @@ export class Points {
       make("div.face-asked", {}, this.front, make("div", {}, this.question, make("div.finder", {}, this.keepButton, this.again))),
       this.list,
       make("div.finder", {}, make("label.check", {}, both, " both sides together"), this.copyButton),
-      make("p.hint", {}, "Click on the head to place the point, or drag its mark. Arrow keys move it by half a millimetre, Page Up and Down forwards and back, Shift further."),
+      make("p.hint", {}, "Click on the head to place the point, or drag its mark; the handles move it along one axis. Arrow keys move it by half a millimetre, Page Up and Down forwards and back, Shift further."),
     );
   }
 
   begin({ says, template }) {
     Object.assign(this, { says, template, names: Object.keys(says) });
-    this.layer.replaceChildren();
-    this.marks.clear();
-    for (const name of this.names) {
-      const mark = make("button.fp", { type: "button", title: `${name} ${says[name]}`, ariaLabel: `Feature point ${name}: ${says[name]}`, tabIndex: -1 });
-      this.marks.set(name, mark);
-      this.drag(name, mark);
-    }
-    this.layer.append(...this.marks.values());
+    this.marks.begin(this.names.map((name) => [name, `Feature point ${name}: ${says[name]}`]));
     this.list.replaceChildren(...this.names.map((name) => make("option", { value: name }, `${name}  ${says[name]}`)));
     this.refresh();
   }
@@ -48,7 +40,9 @@ export class Points {
     return this.draft.state?.asked[0];
   }
 
-  choose(name) {
+  // focused: by the keyboard, which leaves a point that is asked for.
+  choose(name, focused = false) {
+    if (focused && this.asked) return;
     this.chosen = name;
     this.refresh();
   }
@@ -58,11 +52,6 @@ export class Points {
     if (asked.length) this.chosen = asked.includes(this.chosen) && this.asked !== this.chosen ? this.asked : asked[0];
     const name = this.chosen;
     this.list.value = name;
-    for (const [one, mark] of this.marks) {
-      mark.classList.toggle("asked", asked.includes(one));
-      mark.classList.toggle("chosen", one === name);
-      mark.tabIndex = one === name ? 0 : -1;
-    }
     this.question.replaceChildren(make("b", {}, asked.length ? `Click on ${name}` : name), ` ${this.says[name]}`, ...(asked.length ? [make("span.hint", {}, ` ${asked.length} to look at`)] : []));
     this.keepButton.hidden = !asked.length;
     this.copyButton.disabled = !this.draft.other.get(name) || this.draft.other.get(name) === name;
@@ -90,52 +79,31 @@ export class Points {
     this.said(`${this.chosen} ${this.says[this.chosen]}`);
   }
 
-  drag(name, mark) {
-    let [grabbed, moved] = [false, false];
-    const spot = (event) => {
-      const box = this.layer.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
-    mark.onpointerdown = (event) => {
-      [grabbed, moved] = [true, false];
-      mark.setPointerCapture(event.pointerId);
-    };
-    mark.onpointermove = (event) => {
-      if (!grabbed || !event.buttons || !(event.movementX || event.movementY)) return;
-      moved = true;
-      const hit = !INSIDE.has(name) && this.view.hit(...spot(event));
-      const [right, up] = this.view.axes;
-      const pixel = this.view.pixel(this.draft.state.points[name]);
-      const at = this.draft.state.points[name].map((x, k) => x + pixel * (event.movementX * right[k] - event.movementY * up[k]));
-      this.draft.place(name, hit ? hit.place : at, `Drag ${name}:`);
-    };
-    mark.onpointerup = mark.onpointercancel = (event) => {
-      // A click on a mark is one on the head where a point is asked for, and chooses it otherwise.
-      if (grabbed && !moved) this.asked ? this.click(...spot(event)) : this.choose(name);
-      grabbed = false;
-      this.draft.rest();
-    };
-    mark.onkeydown = (event) => this.key(event, name) && event.preventDefault();
-    mark.onfocus = () => !grabbed && !this.draft.state.asked.length && this.choose(name);
+  // A click on a mark is one on the head where a point is asked for, and chooses it otherwise.
+  pressed(name, x, y) {
+    this.asked ? this.click(x, y) : this.choose(name);
   }
 
-  // Move a point by a key; return whether the key does that.
-  key(event, name = this.chosen) {
-    const way = WAYS[event.key];
-    if (!way) return false;
-    const far = STEP * (event.shiftKey ? 10 : 1);
-    this.draft.place(name, this.draft.state.points[name].map((x, k) => x + far * way[k]), `Key ${name}:`);
-    return true;
+  // What the marks need: places of points, and how they move.
+  place(name) {
+    return this.draft.state.points[name];
   }
 
-  // Lay the marks over the picture.
-  lay(moved) {
-    for (const [name, mark] of this.marks) {
-      const place = moved(name);
-      const [x, y] = this.view.onScreen(place);
-      mark.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
-      mark.classList.toggle("behind", !this.view.faces(this.draft.mesh.nearest(this.draft.state.points[name])));
-    }
+  move(name, to, word) {
+    this.draft.place(name, to, word);
+  }
+
+  rest() {
+    this.draft.rest();
+  }
+
+  snaps(name) {
+    return !INSIDE.has(name);
+  }
+
+  lay() {
+    this.marks.lay((name) => !this.view.faces(this.draft.mesh.nearest(this.place(name))));
+    for (const [name, mark] of this.marks.marks) mark.classList.toggle("asked", this.draft.state.asked.includes(name));
   }
 }
 

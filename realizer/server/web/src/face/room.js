@@ -1,4 +1,4 @@
-// The Face tab: opens heads, wires points, zones and masks to the picture, keeps drafts and saves.
+// The Face tab: opens heads, wires points, zones, masks and action units to the picture, keeps drafts and saves.
 import { at, choose, make } from "../dom.js";
 import { download } from "../pose.js";
 import { Difference } from "./difference.js";
@@ -7,9 +7,10 @@ import { FapPanel } from "./faps.js";
 import { gestures } from "./gestures.js";
 import { MaskStrokes } from "./masks.js";
 import { HeadMesh } from "./mesh.js";
-import { Motion } from "./motion.js";
+import { Motion, UNIT } from "./motion.js";
 import { Points } from "./points.js";
 import { StudioService } from "./service.js";
+import { UnitPanel } from "./units.js";
 import { View } from "./view.js";
 
 const BUDGET = 2.5; // ms of a frame for fields
@@ -33,9 +34,14 @@ export class FaceRoom {
     this.shown = [...Object.keys(ACCESSORIES), "marks"].map((name) => button(name, ({ target }) => this.toggle(target, name), { ariaPressed: "true" }));
     parts.append(...this.shown);
     const steps = make("div.segments", { role: "group", ariaLabel: "What is edited" });
-    this.sections = { points: make("div.face-part"), zones: make("div.face-part"), score: make("div.face-part") };
+    this.sections = { points: make("div.face-part"), zones: make("div.face-part"), units: make("div.face-part"), score: make("div.face-part") };
     this.points = new Points(this.sections.points, layer, this.draft, this.view, (text) => this.say(text));
     this.faps = new FapPanel(this.sections.zones, this.draft, { test: (fap, value) => this.motion.test(fap, value) });
+    this.units = new UnitPanel(this.sections.units, layer, this.draft, this.view, {
+      ask: (question) => this.service.ask({ ...question, setup: this.draft.table() }),
+      show: (unit, value) => this.step === "units" && this.motion.show(unit, value),
+      attempt: (doing, work) => this.attempt(doing, work), said: (text) => this.say(text),
+    });
     this.difference = new Difference(at("face-difference"), this.view);
     const views = make("div.finder", {}, button("Score this FAP", () => this.score([this.faps.fap])), ...[["the face’s own shapes", (on) => Object.assign(this.motion, { own: on, lids: null, pending: true })], ["difference", (on) => this.difference.turn(on)]].map(([text, changed]) => {
       const input = make("input", { type: "checkbox" });
@@ -56,7 +62,7 @@ export class FaceRoom {
     this.show(this.step);
     this.strokes = new MaskStrokes(this.view, this.draft, this.faps, at("face-lasso"));
     gestures(canvas, this.view, {
-      click: (x, y) => this.step === "points" && this.draft.mesh && this.points.click(x, y),
+      click: (x, y) => this.draft.mesh && { points: this.points, units: this.units }[this.step]?.click(x, y),
       stroke: (...all) => this.step === "zones" && this.stroke(...all),
       double: () => this.view.home(),
     });
@@ -106,6 +112,7 @@ export class FaceRoom {
       this.view.load(mesh);
       this.motion.begin();
       this.expected = head.version;
+      this.units.begin(head);
       this.draft.begin(head, mesh);
       this.points.begin(head);
       this.faps.begin(head);
@@ -120,6 +127,7 @@ export class FaceRoom {
       return [kept ? "The draft that this browser has kept goes on; Undo takes you back to the face." : "", ...head.notes].filter(Boolean).join(" ");
     });
     this.loading = false;
+    this.show(this.step);
   }
 
   async read(file) {
@@ -168,7 +176,7 @@ export class FaceRoom {
     const { state } = this.draft;
     const done = await this.attempt("Saving …", async () => {
       const name = this.name.value.trim();
-      const { saved, version } = await this.service.ask({ type: "save", name, expected: this.conflict ?? this.expected, ...this.table });
+      const { saved, version } = await this.service.ask({ type: "save", name, expected: this.conflict ?? this.expected, units: state.units, ...this.table });
       Object.assign(this, { expected: version, conflict: undefined });
       if (this.draft.state === state) this.draft.forget();
       return `Saved as ${saved}`;
@@ -194,7 +202,10 @@ export class FaceRoom {
   show(step) {
     this.step = step;
     for (const [name, section] of Object.entries(this.sections)) section.hidden = name !== step;
-    at("face-marks").hidden = step !== "points" || !this.marks;
+    for (const [name, { marks }] of [["points", this.points], ["units", this.units]]) marks.show(step === name && this.marks);
+    at("face-marks").hidden = !["points", "units"].includes(step) || !this.marks;
+    if (step === "units" && this.draft.mesh && !this.loading) this.units.take();
+    else if (this.motion.fap === UNIT) this.motion.test(this.faps.fap, this.faps.value);
     if (this.points.says) this.refresh();
     this.repaint = true;
     this.view.stale = true;
@@ -203,6 +214,7 @@ export class FaceRoom {
   refresh() {
     if (this.step === "points") this.points.refresh();
     if (this.step === "zones") this.faps.refresh();
+    if (this.step === "units") this.units.refresh();
   }
 
   toggle(button, name) {
@@ -251,20 +263,27 @@ export class FaceRoom {
     if (posed) this.view.pose(posed, moved && this.last === moved ? this.motion.changed : null);
     this.last = posed ?? this.last;
     if (posed || this.repaint) this.paint();
+    if (posed && this.look) this.view.arrows(this.look.vertices, this.look.heat);
     this.spent = performance.now() - begin; // ms of script before the picture is drawn
     if (!this.view.draw()) return;
-    if (!at("face-marks").hidden) this.points.lay((name) => this.draft.state.points[name]);
+    if (!at("face-marks").hidden) (this.step === "units" ? this.units : this.points).lay();
     this.difference.draw();
   }
 
-  // Heat and wire of the FAP, and its mask where that is edited.
+  // The look of the action unit that is shown, or none.
+  get look() {
+    return this.step === "units" && this.marks ? this.units.look : null;
+  }
+
+  // Heat and wire of the FAP, and its mask where that is edited; or heat and arrows of the action unit.
   paint() {
     const { fap } = this.faps;
     const zone = this.step === "zones" && this.draft.state.zones.get(fap);
-    const field = zone && this.motion.has(fap) && this.marks ? this.motion.field(fap) : null;
+    const field = zone && this.motion.has(fap) && this.marks ? this.motion.field(fap) : (this.look?.heat ?? null);
     const key = [field, zone, this.strokes.mask, this.faps.tool, this.faps.mask, this.marks];
     if (this.painted?.every((one, k) => one === key[k]) && !this.strokes.mask) return;
     [this.painted, this.repaint] = [key, false];
+    this.view.arrows(this.look?.vertices ?? null, field);
     this.view.paint(field, zone && this.faps.tool ? (this.strokes.mask ?? this.faps.mask) : null);
     if (zone && this.marks) this.view.wire(this.draft.state.points[this.draft.rows.get(fap).point], zone.scale.map((scale) => scale * zone.size * (1 + zone.smooth_side)));
     else this.view.wire(null);

@@ -6,6 +6,7 @@ const LIMIT = { pitch: 1.3, yaw: 3.1 };
 const CLAY = { skin: 0xc9b3a4, left_eye: 0xf2efe9, right_eye: 0xf2efe9, upper_teeth: 0xeee8dc, lower_teeth: 0xeee8dc, tongue: 0xb4615e };
 const OTHER = 0x8a8f9c;
 const IRIS = 0x3d4a5c;
+const [ARROW, OVER] = [0.0075, 0.0012]; // m: the longest arrow, and how far arrows are over the skin
 // Influence from nothing to all of it; what a mask holds is drawn in another colour.
 const HEAT = [0x2f6fd0, 0x2fb6a8, 0xf2d13c, 0xe0522f].map((hex) => new Color(hex));
 const MASKED = new Color(0x8f5bd6);
@@ -24,7 +25,8 @@ export class View {
     const wire = new WireframeGeometry(new SphereGeometry(1, 16, 8));
     this.zone = new LineSegments(wire, new LineBasicMaterial({ color: 0xffffff, transparent: true, opacity: 0.25, depthTest: false }));
     this.zone.visible = false;
-    this.scene.add(this.zone);
+    this.ways = Object.assign(new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x101828 })), { frustumCulled: false, visible: false });
+    this.scene.add(this.zone, this.ways);
     this.hidden = new Set();
     this.stale = true;
     this.home();
@@ -118,6 +120,29 @@ export class View {
       this.zone.scale.set(...radii);
     }
     this.stale = true;
+  }
+
+  // Arrows on the skin along a field of at most 1, from these vertices; null: none.
+  arrows(vertices, field) {
+    this.ways.visible = Boolean(vertices);
+    this.stale = true;
+    if (!vertices) return;
+    const { posed, normals } = this.mesh;
+    const lines = new Float32Array(18 * vertices.length);
+    vertices.forEach((i, n) => {
+      const up = [0, 1, 2].map((k) => normals[3 * i + k]);
+      const way = [0, 1, 2].map((k) => field[3 * i + k]);
+      const long = Math.hypot(...way);
+      const unit = way.map((x) => x / long);
+      const aside = [0, 1, 2].map((k) => unit[(k + 1) % 3] * up[(k + 2) % 3] - unit[(k + 2) % 3] * up[(k + 1) % 3]);
+      const far = ARROW * (0.4 + 0.6 * long);
+      const from = up.map((x, k) => posed[3 * i + k] + OVER * x);
+      const tip = from.map((x, k) => x + far * unit[k]);
+      const barb = (side) => tip.map((x, k) => x - 0.35 * far * (unit[k] + 0.6 * side * aside[k]));
+      lines.set([...from, ...tip, ...tip, ...barb(1), ...tip, ...barb(-1)], 18 * n);
+    });
+    this.ways.geometry.dispose();
+    this.ways.geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(lines, 3));
   }
 
   // Draw if something has changed; return whether.
