@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from realizer.core.errors import FaceError
 from realizer.face.au.units import units
 from realizer.face.features import NAMES, Point, read_features
 from realizer.face.load import MESH, load_folder, read_head

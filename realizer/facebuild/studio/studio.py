@@ -174,7 +174,7 @@ class Studio:
         return {}, {"field": out}
 
     def _unit(self, asked: dict[str, Any], _: bytes) -> Any:
-        """Return the markers, the errors and the field of an action unit, fitted to `markers` if there are."""
+        """Return the markers, errors and field of an action unit, fitted to `markers` if there are any."""
         return self._units(asked).unit(asked.get("au"), asked.get("markers"))
 
     def _units(self, asked: dict[str, Any]) -> UnitFits:

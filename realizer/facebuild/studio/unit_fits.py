@@ -1,4 +1,4 @@
-"""The action units of the head in the Face tab: their markers, and models fitted to markers that were moved."""
+"""The action units of the head in the Face tab: markers, and models fitted to markers that were moved."""
 
 import json
 import math
@@ -68,9 +68,7 @@ class UnitFits:
         Raises:
             FaceError: no such displacement unit, or markers that nothing can be fitted to.
         """
-        known = [unit.au for unit in units().values() if unit.kind == "displacement"]
-        if au not in known:
-            raise FaceError(f"au: wanted one of {', '.join(map(str, known))}, got {str(au)[:40]!r}")
+        au = _number(au)
         strength = _strength(au)
         if markers is None and self._model and au in self._model.units and au in self._measured:
             model, one = self._model, self._measurement(au)
@@ -107,15 +105,13 @@ class UnitFits:
         return self._fits[key]
 
     def write(self, folder: Path, edited: Mapping[str, Any]) -> None:
-        """Write the files of the face's action units to a folder, with those of `edited` (unit -> markers)."""
+        """Write the files of the face's action units, with those of `edited` (unit -> markers)."""
         for file in FILES:
             if (self._folder / file).is_file():
                 shutil.copy(self._folder / file, folder / file)
         if not edited:
             return
-        chosen = {
-            int(au): self.fitted(int(au), markers) for au, markers in edited.items() if self.unit(int(au))
-        }
+        chosen = {(au := _number(key)): self.fitted(au, markers) for key, markers in edited.items()}
         for file in FILES[:2]:
             new = {au: models[file] for au, models in chosen.items()}
             path = folder / file
@@ -140,6 +136,14 @@ class UnitFits:
         at = self._face.vertices[first:last]
         mine = np.flatnonzero((at[:, 0] > -1e-6) & (at[:, 1] > COLLAR)) + first
         return mine, shares(self._face, fit_mouth(self._face))[mine]
+
+
+def _number(au: Any) -> int:
+    """Return the number of a displacement unit, checked."""
+    known = {str(unit.au): unit.au for unit in units().values() if unit.kind == "displacement"}
+    if str(au) not in known:
+        raise FaceError(f"au: wanted one of {', '.join(known)}, got {str(au)[:40]!r}")
+    return known[str(au)]
 
 
 def _strength(au: int) -> float:

@@ -80,7 +80,7 @@ export class UnitPanel {
   async fit() {
     const { au, rows, base } = this;
     this.fitButton.disabled = true;
-    await this.hands.attempt(`Fitting AU${au} to ${rows.length} markers …`, async () => this.keep(await this.hands.ask({ type: "unit", au, markers: rows }), base));
+    await this.hands.attempt(`Fitting AU${au} to ${rows.length} markers …`, async () => this.keep({ ...(await this.hands.ask({ type: "unit", au, markers: rows })), markers: rows }, base));
     this.refresh();
   }
 
