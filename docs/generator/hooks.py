@@ -57,7 +57,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point the links of a page to pages of the site, or into the repository; draw the states."""
     uri = page.file.src_uri
-    if uri == "blocks.md":  # a page would need a script of others to draw it
+    if uri == "blocks.md":  # to draw it, a page would need a third-party script
         markdown = DIAGRAM.sub("![The states of a block](generated/states.svg)", markdown)
     here = posixpath.dirname(uri.removeprefix("project/") if uri.startswith("project/") else f"docs/{uri}")
 

@@ -127,7 +127,7 @@ class Loudspeaker(BaseOutputTransport):
 
 
 async def main(url: str, *, foreign_voice: bool = False) -> None:
-    """Play a user who asks, interrupts the answer, and hears the second one."""
+    """Act as a user who asks, interrupts the answer, and asks again."""
     context = LLMContext()
     turns = UserTurnStrategies(
         start=[TranscriptionUserTurnStartStrategy()], stop=[SpeechTimeoutUserTurnStopStrategy()]

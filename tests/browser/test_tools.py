@@ -281,7 +281,7 @@ def test_sliders_are_found_by_number_and_name(page) -> None:  # type: ignore[no-
     assert page.locator(".row.au:visible").count() == 1
     page.fill("#find-aus", "no such unit")
     words = "getComputedStyle(document.querySelector('#au-sliders'), '::before').content"
-    assert page.evaluate(words) == '"None is called so."'
+    assert page.evaluate(words) == '"Nothing has this name."'
     page.fill("#find-aus", "")
     assert page.evaluate(words) == "none"
     page.click("#tab-faps")

@@ -71,7 +71,7 @@ def test_warn_no_voice_only_where_something_is_said(command: str, only_silence: 
 
 
 class Terminal(io.StringIO):
-    """Standard error of somebody who looks at it."""
+    """Standard error that is a terminal."""
 
     def isatty(self) -> bool:
         return True

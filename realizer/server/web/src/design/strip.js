@@ -45,7 +45,7 @@ export class Strip {
       return this.none(error.message);
     }
     if (asked !== this.asked) return;
-    if (!found.length) return this.none("None is called so.");
+    if (!found.length) return this.none("Nothing has this name.");
     // Without a search those first about whose lengths and company something is known.
     const known = words ? found : found.toSorted((a, b) => b.name.startsWith("template:") - a.name.startsWith("template:"));
     this.panel.replaceChildren(...known.map((row) => this.card(row)));
