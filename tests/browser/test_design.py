@@ -409,13 +409,16 @@ def test_design_saves_files_that_come_back_with_every_field(page, tmp_path) -> N
     page.wait_for_selector(".d-block >> nth=1")
     assert read_timeline(saved(page, "toml").encode()) == timeline
     (tmp_path / "t.bml").write_text(saved(page, "bml"), "utf-8")
-    assert saved(page, "fap").startswith("2.1 timeline 25 ")
+    (tmp_path / "t.fap").write_text(saved(page, "fap"), "utf-8")
     bml = (tmp_path / "t.bml").read_text("utf-8").replace("</bml>", '<head id="h" lexeme="NOD"/></bml>')
     (tmp_path / "t.bml").write_text(bml, "utf-8")
     page.set_input_files("#design-file", tmp_path / "t.bml")
     page.wait_for_function("document.querySelector('#design-status').textContent.startsWith('Left out')")
     assert page.inner_text("#design-status") == "Left out: h: a timeline holds expressions, got <head>"
     assert sum(map(len, spans(page))) == 2
+    page.set_input_files("#design-file", tmp_path / "t.fap")
+    page.wait_for_function(f"{SPANS}.flat(2).includes('RAISE_BROWS')")
+    assert {"RAISE_BROWS", "SMILE"} <= {name for lane in spans(page) for name, *_ in lane}
 
 
 def test_design_edits_an_expression_and_saves_it_to_the_library(page, edits) -> None:  # type: ignore[no-untyped-def]

@@ -23,6 +23,7 @@ from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import plan, play
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
+from realizer.server.design.fap_entries import fap_entries, is_fap
 from realizer.server.design.frames import FILE, document
 from realizer.tables.knowledge import Mood
 
@@ -49,11 +50,14 @@ class Opened:
 
 
 def open_file(text: str, settings: Settings) -> Opened:
-    """Read a timeline file (TOML, JSON), or the expressions of BML.
+    """Read a timeline file (TOML, JSON), or the expressions of BML or of a FAP file.
 
     Raises:
-        TableError: it is neither; the text has a line for each fault.
+        RealizerError: it is none of them; the text has a line for each fault.
     """
+    if is_fap(text):
+        shown, left = fap_entries(text, list(library_of(settings.library_folder).values()))
+        return Opened(timeline_json(_lanes(shown)), left)
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         timeline = read_timeline(text.encode())
         unknown = [
