@@ -1,6 +1,10 @@
 // Checks texts as `realizer check` does: one request at a time, over its own WebSocket.
 import { token } from "./service.js";
 
+const AGAIN = 500; // ms until a connection that failed is tried once more
+
+const later = () => new Promise((resolve) => setTimeout(resolve, AGAIN));
+
 export class Checker {
   constructor() {
     this.socket = null;
@@ -14,14 +18,14 @@ export class Checker {
 
   // Return the answer to a text, or to a request of the designer.
   async send(text) {
-    const socket = await this.open();
+    const socket = await this.open().catch(() => later().then(() => this.open()));
     return new Promise((resolve, reject) => {
       this.waiting.push({ resolve, reject });
       socket.send(text);
     });
   }
 
-  open() {
+  async open() {
     if (this.socket?.readyState === WebSocket.OPEN) return this.socket;
     return (this.opening ??= new Promise((resolve, reject) => {
       const url = new URL("check", location.href);

@@ -75,9 +75,9 @@ export class Lanes extends Gestures {
   }
 
   laneOf(channel, lane) {
-    const list = make("div.d-list", { role: "listbox", ariaLabel: `Channel ${channel.name}`, ariaOrientation: "horizontal" });
-    list.append(...this.design.spans(channel).filter(({ entry }) => !isBreak(entry)).map((span) => this.blockOf(span)));
-    if (!list.childElementCount) list.removeAttribute("role");
+    const blocks = this.design.spans(channel).filter(({ entry }) => !isBreak(entry)).map((span) => this.blockOf(span));
+    const words = { role: "listbox", ariaLabel: `Channel ${channel.name}`, ariaOrientation: "horizontal" };
+    const list = make("div.d-list", blocks.length ? words : {}, ...blocks);
     const name = make("button.d-name", { type: "button", title: "New blocks go to this channel" }, channel.name);
     name.onclick = () => {
       this.design.lane = lane;

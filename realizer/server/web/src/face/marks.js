@@ -15,7 +15,7 @@ export class Marks {
     Object.assign(this, { layer, view, owner, marks: new Map() });
     this.group = make("div");
     this.handles = Object.entries(AXES).map(([name, way]) => {
-      const handle = make(`button.fp.axis.${name}`, { type: "button", title: `Move along ${name}` });
+      const handle = make(`button.fp.axis.${name}`, { type: "button", title: `Move along ${name}`, ariaLabel: `Move along ${name}` });
       const line = document.createElementNS("http://www.w3.org/2000/svg", "line");
       line.classList.add("axis", name);
       this.drag(handle, () => owner.chosen, ([dx, dy], place) => {
