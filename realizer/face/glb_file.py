@@ -121,16 +121,18 @@ def read_glb(raw: bytes) -> tuple[dict[str, Any], bytes]:
     Raises:
         ValueError: it is another file, or truncated.
     """
-    if len(raw) < 20 or raw[:4] != b"glTF":
-        raise ValueError("wanted a GLB file (binary glTF 2.0), got another one")
-    if len(raw) < (length := struct.unpack_from("<I", raw, 8)[0]):
-        raise ValueError(f"wanted {length} bytes, as its header says, got {len(raw)}: it is truncated")
+    if raw[:4] != b"glTF":
+        raise ValueError(f"wanted a GLB file, which begins with 'glTF', got {raw[:4]!r}")
+    if len(raw) < (length := struct.unpack_from("<I", raw, 8)[0] if len(raw) >= 20 else 20):
+        raise ValueError(f"wanted {length} bytes, got {len(raw)}: it is truncated")
     size, kind = struct.unpack_from("<II", raw, 12)
     if kind != JSON_CHUNK:
         raise ValueError("wanted a GLB file of glTF 2.0, got one of another version")
-    document = json.loads(raw[20 : 20 + size])
-    more = 20 + size + 8
-    if len(raw) < more or "uri" in document.get("buffers", [{}])[0]:
+    document, more = json.loads(raw[20 : 20 + size]), 20 + size + 8
+    buffers = document.get("buffers") if isinstance(document, dict) else None
+    if len(raw) < more or not buffers:
+        raise ValueError("wanted a GLB file with meshes, got one without data")
+    if "uri" in buffers[0]:
         raise ValueError("wanted a GLB file that contains its data, got one with data beside it")
     return document, raw[more : more + struct.unpack_from("<I", raw, more - 8)[0]]
 
