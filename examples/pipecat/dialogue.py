@@ -127,7 +127,7 @@ class Loudspeaker(BaseOutputTransport):
 
 
 async def main(url: str, *, foreign_voice: bool = False) -> None:
-    """Act as a user who asks, interrupts the answer, and asks again."""
+    """Act as a user: ask, and interrupt the answer."""
     context = LLMContext()
     turns = UserTurnStrategies(
         start=[TranscriptionUserTurnStartStrategy()], stop=[SpeechTimeoutUserTurnStopStrategy()]

@@ -13,6 +13,7 @@ from realizer.animation.axis import au_row
 from realizer.core.array_types import Float64
 from realizer.core.atomic_files import write_text
 from realizer.corpus.learn import faps_of, features
+from realizer.corpus.matching_pursuit import explain
 from realizer.corpus.recording import Recording, Segment
 from realizer.corpus.statistics import FEWEST, Study
 from realizer.tables import action_units, au_to_fap
@@ -21,7 +22,7 @@ from realizer.tables.timing import gaps
 
 FOLDER = "expressions"
 SEEN = range(1, 51)  # action units of the face; the others turn head and eyes
-MOST, WORTH = 6, 0.2  # units of an expression, and the least share of it that one more explains
+MOST, WORTH = 6, 0.04  # units of an expression, and the least share of its squared movement that one explains
 LEAST = 0.1  # intensity of a unit
 RISING = 0.1, 0.9  # of the strength of a segment, between which it rises and falls
 AROUND = 1.0  # s before and after a segment in which it does
@@ -75,21 +76,9 @@ def found_expressions(study: Study) -> list[Found]:
 
 def units_of(face: Float64) -> dict[str, float]:
     """Return the action units that explain a face (68,) in millimetres, as `learn.features` gives it."""
-    from scipy.optimize import nnls
-
     names, shown = _units()
-    lengths = np.maximum(np.linalg.norm(shown, axis=1), 1e-9)
-    whole = float(np.linalg.norm(face))
-    chosen: list[int] = []
-    weights = np.zeros(0)
-    for _ in range(MOST):
-        gains = shown @ (face - weights @ shown[chosen]) / lengths
-        gains[chosen] = 0
-        if gains.max() <= WORTH * whole:
-            break
-        chosen.append(int(gains.argmax()))
-        weights = nnls(shown[chosen].T, face)[0]
-    pairs = sorted(zip(chosen, weights.tolist(), strict=True))
+    chosen, weights = explain(face[None], shown, MOST, WORTH)
+    pairs = sorted(zip(chosen, weights[0].tolist(), strict=True))
     return {names[k]: round(min(weight, 1.0), 2) for k, weight in pairs if weight >= LEAST}
 
 

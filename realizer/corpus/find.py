@@ -27,11 +27,12 @@ def find(recording: Recording, learnt: FaceMap) -> list[Segment]:
 
 def segments(shown: Bool) -> list[tuple[int, int]]:
     """Return the first and last frames of segments: gaps filled, short ones left out, near ones joined."""
-    runs = _joined(_runs(shown), GAP + 1)
-    return _joined([(first, last) for first, last in runs if last - first + 1 >= SHORTEST], JOINED)
+    filled = _joined(runs(shown), GAP + 1)
+    return _joined([(first, last) for first, last in filled if last - first + 1 >= SHORTEST], JOINED)
 
 
-def _runs(shown: Bool) -> list[tuple[int, int]]:
+def runs(shown: Bool) -> list[tuple[int, int]]:
+    """Return the first and last frames of each run of frames that show something."""
     edges = np.flatnonzero(np.diff(np.r_[0, np.asarray(shown, np.int8), 0]))
     return [(int(first), int(end) - 1) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 

@@ -16,7 +16,7 @@ from realizer.core.array_types import Bool, Float32, Float64, UInt8
 from realizer.core.atomic_files import replacing, write_text
 from realizer.core.toml_text import parse_toml
 from realizer.corpus.recording import CorpusError, Recording
-from realizer.tables import faps
+from realizer.tables import HEAD_COLUMNS, faps
 from realizer.tables.templates import templates
 
 VARIANCE = 0.9  # of the data that the components keep
@@ -59,7 +59,7 @@ def features(recording: Recording) -> Float64:
     """Return frames (n, d) in mm: FAPs of the face, or points without the head's pose; or CorpusError."""
     if recording.faps is not None:
         scale = np.array([MILLIMETRES[row.unit] for row in faps()])
-        scale[47:50] = 0.0  # the pose of the head
+        scale[HEAD_COLUMNS] = 0.0
         return np.asarray(recording.faps * scale)
     if recording.points is None:
         raise CorpusError(f"{recording.name}: wanted FAPs or points, got none; add them")

@@ -115,26 +115,47 @@ class GlbFile:
         return len(self._accessors) - 1
 
 
+def chunks_of(raw: bytes) -> tuple[bytes, bytes | None]:
+    """Return the text of the document of a GLB file, and its binary chunk if it has one.
+
+    Raises:
+        ValueError: it is another file, one of another version, or truncated.
+    """
+    if raw[:4] != b"glTF":
+        raise ValueError(f"wanted a GLB file, which begins with 'glTF', got {raw[:4]!r}")
+    if len(raw) < 20:
+        raise ValueError(f"wanted a GLB header, got {len(raw)} bytes: it is truncated")
+    _, version, length = struct.unpack_from("<III", raw)
+    if version != 2:
+        raise ValueError(f"wanted GLB version 2, got {version}; export it as glTF 2.0")
+    if length > len(raw):
+        raise ValueError(f"wanted {length} bytes, as its header says, got {len(raw)}: it is truncated")
+    found: dict[int, bytes] = {}
+    at = 12
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", raw, at)
+        chunk = raw[at + 8 : at + 8 + size]
+        if len(chunk) < size:
+            raise ValueError(f"wanted a chunk of {size} bytes, got {len(chunk)}: it is truncated")
+        found.setdefault(kind, chunk)
+        at += 8 + size
+    return found.get(JSON_CHUNK, b""), found.get(BINARY_CHUNK)
+
+
 def read_glb(raw: bytes) -> tuple[dict[str, Any], bytes]:
     """Return the document and the binary chunk of a GLB file of glTF 2.0 that contains its data.
 
     Raises:
         ValueError: it is another file, or truncated.
     """
-    if raw[:4] != b"glTF":
-        raise ValueError(f"wanted a GLB file, which begins with 'glTF', got {raw[:4]!r}")
-    if len(raw) < (length := struct.unpack_from("<I", raw, 8)[0] if len(raw) >= 20 else 20):
-        raise ValueError(f"wanted {length} bytes, got {len(raw)}: it is truncated")
-    size, kind = struct.unpack_from("<II", raw, 12)
-    if kind != JSON_CHUNK:
-        raise ValueError("wanted a GLB file of glTF 2.0, got one of another version")
-    document, more = json.loads(raw[20 : 20 + size]), 20 + size + 8
+    text, data = chunks_of(raw)
+    document = json.loads(text)
     buffers = document.get("buffers") if isinstance(document, dict) else None
-    if len(raw) < more or not buffers:
+    if data is None or not buffers:
         raise ValueError("wanted a GLB file with meshes, got one without data")
     if "uri" in buffers[0]:
         raise ValueError("wanted a GLB file that contains its data, got one with data beside it")
-    return document, raw[more : more + struct.unpack_from("<I", raw, more - 8)[0]]
+    return document, data
 
 
 def _little(array: Any) -> Any:

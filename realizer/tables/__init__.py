@@ -182,6 +182,7 @@ class AuCombination:
 
 # Functions without arguments that return the rows of a table.
 faps = cache(partial(csv_rows, "faps.csv", Fap))  # row i is FAP i + 1
+HEAD_COLUMNS = slice(47, 50)  # of arrays of the 68 FAPs: those that turn the head
 action_units = cache(partial(csv_rows, "action_units.csv", ActionUnit))  # in ascending order
 au_to_fap = cache(partial(csv_rows, "au_to_fap.csv", AuToFap))
 # What FACS lists as other than the sum of its action units.

@@ -17,6 +17,7 @@ from realizer.analysis.faps_from_points import head_angles
 from realizer.animation.axis import AU_NAMES
 from realizer.core.array_types import Float32, Float64
 from realizer.core.units import ANGLE_UNIT
+from realizer.tables import HEAD_COLUMNS
 from realizer.tracking.landmarks import Landmarks
 
 UP = np.array([1.0, -1.0, -1.0])  # pixels go down, and depths away from the camera; heads look along +z
@@ -98,7 +99,7 @@ def measure(seen: Components, neutral: Float64 | None = None) -> Measured:
     frames = np.zeros((len(values), 68))
     frames[:, np.array(SEEN_FAPS) - 1] = moved
     head = seen.rotations @ Rotation.from_rotvec(turned).as_matrix()
-    frames[:, 47:50] = head_angles(head) / ANGLE_UNIT
+    frames[:, HEAD_COLUMNS] = head_angles(head) / ANGLE_UNIT
     return Measured(np.clip(units, 0, 1), frames)
 
 

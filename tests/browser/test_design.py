@@ -16,6 +16,7 @@ import pytest
 from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_file import read_timeline, write_timeline
+from tests.accessibility import serious_faults
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
@@ -492,18 +493,11 @@ def test_design_loses_nothing_with_the_connection(browser, address) -> None:  # 
 
 
 def test_design_has_no_serious_accessibility_fault(page) -> None:  # type: ignore[no-untyped-def]
-    axe = pytest.importorskip("axe_core_python.sync_playwright", reason="needs the test extra").Axe()
     add(page, "astonishment", "regret")
     page.wait_for_selector(".d-ghost")
     for view in ("first", "last"):
         page.click(f"#design-views button:{view}-child")
         for scheme in ("light", "dark"):
             page.emulate_media(color_scheme=scheme)
-            found = axe.run(page, options={"resultTypes": ["violations"]})["violations"]
-            serious = [
-                f"{one['id']}: {one['nodes'][0]['html'][:200]}"
-                for one in found
-                if one["impact"] in ("serious", "critical")
-            ]
-            assert serious == []
+            assert serious_faults(page) == [], f"{view} view, {scheme}"
     page.emulate_media(color_scheme="light")

@@ -12,6 +12,7 @@ import pytest
 
 import realizer
 from realizer.corpus.recording import Annotation, Recording, read_recording, write_recording
+from tests.accessibility import serious_faults
 from tests.browser.test_design import drag, warm
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
 
@@ -268,10 +269,8 @@ def test_label_works_with_a_finger_on_a_phone(browser, address) -> None:  # type
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_label_has_no_serious_accessibility_fault(browser, address, scheme: str) -> None:  # type: ignore[no-untyped-def]
-    axe = pytest.importorskip("axe_core_python.sync_playwright", reason="needs the test extra").Axe()
     page = opened(browser, address, color_scheme=scheme)
     annotate(page, "tom")
     page.click(block("surprise"))
-    found = axe.run(page, options={"resultTypes": ["violations"]})["violations"]
-    assert [row["id"] for row in found if row["impact"] in ("serious", "critical")] == []
+    assert serious_faults(page) == []
     page.close()

@@ -11,6 +11,7 @@ import pytest
 
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.tables import action_units, faps
+from tests.accessibility import serious_faults
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
@@ -405,14 +406,11 @@ def test_page_is_light_or_dark(page) -> None:  # type: ignore[no-untyped-def]
 
 
 def test_page_has_no_serious_accessibility_fault_in_any_tab(page) -> None:  # type: ignore[no-untyped-def]
-    axe = pytest.importorskip("axe_core_python.sync_playwright", reason="needs the test extra").Axe()
     for scheme, rules in (("light", {}), ("dark", {"runOnly": ["color-contrast"]})):
         page.emulate_media(color_scheme=scheme)
         for tab in page.locator("#tabs button:visible").all():
             tab.click()
-            found = axe.run(page, options={"resultTypes": ["violations"], **rules})["violations"]
-            serious = [row["nodes"][0]["html"] for row in found if row["impact"] in ("serious", "critical")]
-            assert serious == [], f"{tab.inner_text()}, {scheme}"
+            assert serious_faults(page, **rules) == [], f"{tab.inner_text()}, {scheme}"
     page.emulate_media(color_scheme="light")
 
 

@@ -8,7 +8,6 @@ import base64
 import binascii
 import io
 import json
-import struct
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -17,7 +16,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.face.glb_file import BINARY_CHUNK, JSON_CHUNK
+from realizer.face.glb_file import chunks_of
 from realizer.facebuild.arkit.gltf_schema import document_fault
 from realizer.facebuild.arkit.meshopt import EXTENSIONS, unpack
 
@@ -76,30 +75,10 @@ class Gltf:
         self._room = MAX_NUMBERS
 
     def _chunks(self, raw: bytes) -> bytes:
-        if len(raw) < 20:
-            raise FaceError(f"{self.path}: wanted a GLB header, got {len(raw)} bytes; export the head again")
-        _, version, length = struct.unpack_from("<III", raw)
-        if version != 2:
-            raise FaceError(f"{self.path}: wanted GLB version 2, got {version}; export the head as glTF 2.0")
-        if length > len(raw):
-            raise FaceError(
-                f"{self.path}: wanted {length} bytes, as its header says, got {len(raw)}: it is truncated; "
-                "copy or export it again"
-            )
-        text, at = b"", 12
-        while at + 8 <= length:
-            size, kind = struct.unpack_from("<II", raw, at)
-            chunk = raw[at + 8 : at + 8 + size]
-            if len(chunk) < size:
-                raise FaceError(
-                    f"{self.path}: wanted a chunk of {size} bytes, got {len(chunk)}: it is truncated; "
-                    "copy or export it again"
-                )
-            if kind == JSON_CHUNK and not text:
-                text = chunk
-            elif kind == BINARY_CHUNK and self._binary is None:
-                self._binary = chunk
-            at += 8 + size
+        try:
+            text, self._binary = chunks_of(raw)
+        except ValueError as error:
+            raise FaceError(f"{self.path}: {error}; copy or export it again") from None
         return text
 
     def list(self, name: str) -> list[dict[str, Any]]:

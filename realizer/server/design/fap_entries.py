@@ -9,19 +9,21 @@ from realizer.animation.axis import au_row
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
+from realizer.corpus.find import runs
 from realizer.corpus.learn import faps_of, features
+from realizer.corpus.matching_pursuit import explain
 from realizer.corpus.recording import Recording
 from realizer.expressions.expression import Expression
 from realizer.expressions.timeline import Entry
 from realizer.expressions.timeline_file import MIN_SECONDS
+from realizer.tables import HEAD_COLUMNS
 
 FPS = 25.0
 MOST_FRAMES = 7500  # five minutes
-MOST, WORTH = 10, 0.02  # expressions, and the least share of all movement that one more explains
+MOST, WORTH = 10, 0.02  # expressions, and the least share of all squared movement that one more explains
 LEAST = 0.06  # intensity of an entry
 VALLEY = 0.6  # of the smaller of two peaks; what falls below between them is two entries
 WHOLE = 0.9  # of its peak, from which an entry counts as reached
-POSE = range(48, 51)  # FAPs that turn the head
 
 
 def is_fap(text: str) -> bool:
@@ -49,13 +51,13 @@ def fap_entries(text: str, library: Sequence[Expression]) -> tuple[list[tuple[fl
             f"wanted FAPs of at most {MOST_FRAMES / FPS:.0f} s, got {len(clip.values) / clip.fps:.1f} s"
         )
     clip = clip.resampled(FPS)
-    if clip.visemes[:, 2].any() or clip.visemes[:, :2].any():
+    if clip.visemes[:, :3].any():
         left.append("FAP 1: a timeline holds expressions, got visemes")
-    if clip.values[:, POSE.start - 1 : POSE.stop - 1].any():
+    if clip.values[:, HEAD_COLUMNS].any():
         left.append("FAP 48 to 50: a timeline holds expressions, got turns of the head")
     shown = faps_of(np.stack([au_row(one.aus) for one in library])) * clip.mask
     faces, shown = (features(Recording("", faps=faps)) for faps in (clip.values.astype(np.float64), shown))
-    chosen, weights = _explained(faces, shown)
+    chosen, weights = explain(faces, shown, MOST, WORTH)
     entries = [
         found for k, row in zip(chosen, weights.T, strict=True) for found in _entries(library[k].name, row)
     ]
@@ -67,32 +69,11 @@ def fap_entries(text: str, library: Sequence[Expression]) -> tuple[list[tuple[fl
     return entries, left
 
 
-def _explained(faces: Float64, shown: Float64) -> tuple[list[int], Float64]:
-    """Return the rows of `shown` that explain faces (n, 68), and their weights (n, rows)."""
-    from scipy.optimize import nnls
-
-    whole = float(np.sum(faces**2))
-    lengths = np.maximum(np.linalg.norm(shown, axis=1), 1e-9)
-    chosen: list[int] = []
-    weights = np.zeros((len(faces), 0))
-    while len(chosen) < MOST:
-        rest = faces - weights @ shown[chosen]
-        gains = np.sum(np.maximum(rest @ (shown / lengths[:, None]).T, 0) ** 2, axis=0)
-        gains[chosen] = 0
-        if gains.max() <= WORTH * whole:
-            break
-        chosen.append(int(gains.argmax()))
-        weights = np.stack([nnls(shown[chosen].T, face)[0] for face in faces])
-    return chosen, weights
-
-
 def _entries(name: str, weights: Float64) -> list[tuple[float, Entry]]:
     """Return start and entry of each peak of an expression's intensity (n,), 25 a second."""
-    edged = np.r_[0.0, weights, 0.0]
-    edges = np.flatnonzero(np.diff((edged > LEAST / 2).astype(int)))
     found = []
-    for first, last in edges.reshape(-1, 2):  # frames first..last - 1 of `weights`
-        for begin, end in _peaks(weights[first:last]):
+    for first, last in runs(weights > LEAST / 2):
+        for begin, end in _peaks(weights[first : last + 1]):
             part = weights[first + begin : first + end]
             if part.max() < LEAST:
                 continue

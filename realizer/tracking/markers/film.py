@@ -13,6 +13,7 @@ from realizer.core.array_types import Bool, Float64
 from realizer.face.load import load_face
 from realizer.outputs.csv_table import csv_text
 from realizer.outputs.fap_text import encode
+from realizer.tables import HEAD_COLUMNS
 from realizer.tables import faps as fap_rows
 from realizer.tracking.files import clip_of
 from realizer.tracking.markers.blobs import Box, blobs
@@ -29,7 +30,6 @@ TRIED = 40  # pictures in which the face is looked for
 GOOD = 0.12  # distance of markers from the layout that is taken for theirs, relative to its size
 UP = np.array([1.0, -1.0])  # rows of pictures go down
 SIDES = ("left", "right", "up", "down")  # what is seen from the front
-HEAD = range(47, 50)  # columns of FAPs of the head's rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def faps_of(markers: Markers, face: str = "default") -> tuple[Float64, Bool]:
     now = {name: (places + moved)[:, k] for k, name in enumerate(names)}
     values, seen = faps_from_points(now, dict(zip(names, places, strict=True)), head.fapu)
     flat = np.array([row.direction in SIDES for row in fap_rows()])
-    flat[list(HEAD)] = False
+    flat[HEAD_COLUMNS] = False
     return np.where(flat, values, 0.0).astype(np.float64), seen & flat
 
 

@@ -102,7 +102,7 @@ def test_read_avatar_finds_arkit_shapes_among_expressions(written, vrm):
         (b"", "wanted a GLB file"),
         (b"<bml/>" * 10, "wanted a GLB file"),
         (avatars.avatar()[:-50], "it is truncated"),
-        (avatars.avatar()[:12], "wanted 20 bytes, got 12: it is truncated"),
+        (avatars.avatar()[:12], "wanted a GLB header, got 12 bytes: it is truncated"),
         (changed(avatars.avatar(), lambda d: d.pop("buffers")), "got one without data"),
         (avatars.avatar(()), "mouthSmileLeft, or VRM's expressions, got no morph targets"),
         (avatars.avatar(("smile", "frown")), "got smile, frown"),
