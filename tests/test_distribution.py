@@ -32,6 +32,7 @@ def build(source: Path, target: Path, *options: str) -> list[bytes]:
     return [(target / name).read_bytes() for name in NAMES if (target / name).is_file()]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.skipif(
     not (ROOT / "pyproject.toml").is_file() or not (ROOT / "realizer/server/static/index.html").is_file(),
