@@ -16,7 +16,7 @@ from realizer.playback.active_block import ActiveBlock
 from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.realization import FaceChange, Performance, Realization, frames_until, merge_warnings
 from realizer.server.journal.entry import JournalError, SavedSession
-from realizer.server.journal.replay import replay
+from realizer.server.journal.replay import replay, replay_until, restore_checkpoint
 from realizer.server.runtime.engines import Engines
 from realizer.server.session.connections import FeedbackLog
 from realizer.server.session.session import Session
@@ -205,7 +205,7 @@ class _Replay:
             raise JournalError(f"the recording of {name}: {error}") from None
         self.log = _FullLog(recording.epoch)
         self.session = Session(name, settings, 0.0, named=True, scene=_scene(head), log=self.log)
-        self.begin = self.session.restore(recording.parts) if recording.parts else 0.0
+        self.begin = restore_checkpoint(self.session, recording.parts) if recording.parts else 0.0
         self._entries = recording.entries
         self.last = recording.entries[-1].at if recording.entries else self.begin
 
@@ -220,10 +220,10 @@ class _Replay:
         # An open speech has no end; it ends when all other blocks have ended.
         ends = [block.end for block in session.player.blocks.active()]
         end = max((end for end in ends if end < self.last + OPEN / 2), default=self.last)
-        session.replay_until(end, look, since=self.last)
+        replay_until(session, end, look, since=self.last)
         look(end)
         session.player.stop(end, session.submission.speeches.open_ids)
-        session.replay_until(float("inf"), look, since=end)
+        replay_until(session, float("inf"), look, since=end)
 
 
 class _FullLog(FeedbackLog):

@@ -129,7 +129,7 @@ def replay(
     for index, entry in enumerate(entries):
         if watch is not None:
             watch.before(session, index, entry)
-        session.replay_until(entry.at, before_event)
+        replay_until(session, entry.at, before_event)
         before_event(entry.at)
         match entry.kind:
             case "join":
@@ -153,6 +153,41 @@ def replay(
     return list(unanswered.values())
 
 
+def replay_until(
+    session: Session, t: float, before: Callable[[float], None] = lambda t: None, *, since: float = 0.0
+) -> None:
+    """Publish the feedback of a session that is due before `t`, each at its own time.
+
+    Args:
+        before: called with each of those times, before the feedback is published.
+        since: the time of feedback that is due immediately.
+    """
+    while (due := session.player.next_deadline()) is not None and due < t and not session.closed:
+        due = max(due, since)
+        if session.clock.stands_still(due):
+            return  # it was published when the documents of a message had been planned
+        before(due)
+        session.due.publish(due)
+
+
+def restore_checkpoint(session: Session, parts: Mapping[str, str]) -> float:
+    """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
+
+    Args:
+        parts: the parts of the checkpoint, as in `SavedSession`.
+
+    Returns:
+        The time of the checkpoint on the session clock.
+
+    Raises:
+        JournalError: the parts are invalid, or of another version.
+    """
+    at, connections = session.journal.checkpoint.read(session.id, parts)
+    for connection in connections:
+        session.connect(connection, at)
+    return at
+
+
 def restore_session(
     session: Session,
     saved: SavedSession,
@@ -167,7 +202,7 @@ def restore_session(
     Raises:
         JournalError: the checkpoint cannot be read.
     """
-    at = session.restore(saved.parts) if saved.parts else 0.0
+    at = restore_checkpoint(session, saved.parts) if saved.parts else 0.0
     unanswered = replay(session, saved.entries, speak, watch=watch)
     if watch is not None:
         watch.follow()

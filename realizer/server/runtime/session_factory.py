@@ -218,7 +218,7 @@ class SessionFactory:
             capabilities=self._capabilities,
             epoch=epoch,
         )
-        session.inbox.ending = self.ending
+        session.is_ending = self.ending
         session.broadcast.counts = session.submission.counts = self._metrics.counts
         session.broadcast.overload = self.overload
         return session

@@ -93,7 +93,7 @@ class SessionHost(SessionRunner):
         """Refuse documents from now on."""
         self._factory.ending = True
         for session in self._registry.sessions.values():
-            session.inbox.ending = True
+            session.is_ending = True
 
     async def drain(self) -> None:
         """Wait at most `settings.drain` seconds for what plays."""

@@ -1,10 +1,10 @@
 """The runner of sessions in an event loop: delivers messages, wakes sessions, carries out their effects."""
 
 import asyncio
-import functools
 import itertools
 import logging
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import TypeVar
 
 from realizer.core import work
@@ -107,7 +107,7 @@ class SessionRunner:
             return False
         self.metrics.counts["messages"] += 1
         began = self._loop.time()
-        self._call(session, functools.partial(self._receive, session, number, message))
+        self._call(session, partial(self._receive, session, number, message))
         self._report_slow_step(began, f"a message of {len(message)} characters", session, [number])
         return True
 
@@ -192,7 +192,13 @@ class SessionRunner:
                 case Look():
                     self._submit(session, engines.tracking_pool, engines.look, effect, session.on_sight)
                 case Write():
-                    self._submit(session, engines.file_pool, save, effect, session.on_saved)
+                    self._submit(
+                        session,
+                        engines.file_pool,
+                        save,
+                        effect,
+                        lambda id, reply, now: session.connections.reply(id, reply),
+                    )
                 case Close(connection, code, reason):
                     if (client := self._clients.get(connection)) is not None:
                         client.disconnect(code, reason)
@@ -210,7 +216,7 @@ class SessionRunner:
                 result = future.result()
                 self._deliver(session, lambda: take(effect.id, result, self._loop.time()))
 
-        computed = pool.submit(session, functools.partial(compute, effect))
+        computed = pool.submit(session, partial(compute, effect))
         asyncio.wrap_future(computed, loop=self._loop).add_done_callback(answer)
 
     # time ---------------------------------------------------------------------------------------
@@ -235,7 +241,7 @@ class SessionRunner:
         self._overload.note(now - when, now)
         if self._calls.is_busy(session):
             return  # it is woken again when its call has ended
-        self._calls.call(session, functools.partial(self._send_due, session, now), FRAME_SLICES)
+        self._calls.call(session, partial(self._send_due, session, now), FRAME_SLICES)
 
     def _send_due(self, session: Session, now: float) -> None:
         try:
@@ -244,7 +250,7 @@ class SessionRunner:
             self._fail(session)
             return
         if frames is None:
-            self._call(session, functools.partial(self._work, session, now, read_documents=False))
+            self._call(session, partial(self._work, session, now, read_documents=False))
             return
         sends, due = frames
         self._run(session, sends)
@@ -260,7 +266,7 @@ class SessionRunner:
         if self._calls.is_busy(session):
             self._calls.resume(session)
         elif not session.closed:
-            self._call(session, functools.partial(self._read_document, session, began))
+            self._call(session, partial(self._read_document, session, began))
         self._report_slow_step(began, "a document", session)
 
     def _read_document(self, session: Session, now: float) -> None:

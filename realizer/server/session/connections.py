@@ -245,8 +245,8 @@ class Connections(dict[int, Connection]):
         return connection.is_slow
 
     def reply(self, id: int, reply: Reply) -> None:
-        """Send a message to a connection."""
-        if self:  # the session has not ended
+        """Send a message to a connection that has not left."""
+        if id in self:
             self.add_effects([Send(id, reply.text())])
 
     def write(self, id: int, message: Save, folder: Path) -> None:

@@ -1,7 +1,8 @@
-"""Handlers of the control messages that change a session."""
+"""Handlers of the control messages."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import get_args
 
 from realizer.core.errors import FaceError, VoiceError
 from realizer.playback.player import Player
@@ -16,6 +17,7 @@ from realizer.protocol.messages.requests import (
     SetMessage,
     Stop,
     Subscribe,
+    Track,
     Unsubscribe,
 )
 from realizer.protocol.messages.speech import SpeechMessage
@@ -24,20 +26,27 @@ from realizer.server.documents.document_queue import Submission
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection
 from realizer.server.session.control_fields import FieldError, character_index, direct_values, emotion_values
+from realizer.server.session.query_handlers import Query, QueryHandlers
 from realizer.server.session.subscriptions import Subscriptions
+from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, heard_samples
 from realizer.server.speech.speech_streams import PATIENCE
+
+# Messages that affect only their own connection: they are not written to the journal.
+PASSING = (*get_args(Query), Subscribe, Unsubscribe, Track)
 
 
 @dataclass(eq=False)
 class ControlHandlers:
-    """The handlers of the control messages that change what a session shows or sends."""
+    """The handlers of the control messages of a session."""
 
     player: Player
     faces: CharacterFaces
     clips: AudioClips
     submission: Submission
     subscriptions: Subscriptions
+    queries: QueryHandlers
+    tracked: TrackedFaces
     reply: Callable[[int, Reply], None]
 
     def handle(self, connection: Connection, message: Control, t: float) -> None:
@@ -81,6 +90,10 @@ class ControlHandlers:
                 self._speech(connection, message, t)
             case Stop():
                 self._stop(message, t)
+            case Track():
+                self.tracked.start(connection.id, message)
+            case _:
+                self.queries.handle(connection, message, t)
 
     def handle_sound(self, connection: Connection, message: bytes, t: float) -> None:
         """Add a piece of a sound clip, or reply with an error."""

@@ -93,7 +93,6 @@ class DueWork:
             Whether a document or a speech changed the state.
         """
         self.must_end_speech = bool(self.submission.speeches.overdue(t))
-        self.broadcast.quiet_until = -math.inf
         self.publish(t, starts=starts)
         if self.broadcast.active or self.connections.has_subscriptions:
             self.broadcast.set_subscribers(self.connections.values())

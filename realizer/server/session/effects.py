@@ -87,10 +87,7 @@ class Look:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Write:
-    """Save a file in a folder and call `session.on_saved(id, the reply, now)`.
-
-    `id` is the number of the connection that asks for it.
-    """
+    """Save a file in a folder and send the reply to the connection `id`."""
 
     id: int
     message: Save

@@ -5,28 +5,31 @@ It opens no sockets and reads no clock.
 
 from __future__ import annotations
 
+import json
 import logging
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from bml_schema import WarningFeedback
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
-from realizer.protocol.messages.common import Reply
-from realizer.server.documents.document_queue import Submission
+from realizer.protocol.messages.parse import Control, parse_control
+from realizer.protocol.messages.replies import ErrorMessage
+from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import TakenOver
 from realizer.server.journal.checkpoint import Checkpoint
+from realizer.server.journal.entry import Kind
 from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Connections, FeedbackLog
-from realizer.server.session.control_handlers import ControlHandlers
+from realizer.server.session.control_handlers import PASSING, ControlHandlers
 from realizer.server.session.due_work import DueWork, SessionClock
 from realizer.server.session.effects import Close, Effect
-from realizer.server.session.inbox import Inbox
 from realizer.server.session.query_handlers import QueryHandlers
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.tracked_faces import TrackedFaces
@@ -53,6 +56,9 @@ class Session:
             `settings.keep`.
         epoch: POSIX seconds at `now`, added to every time in feedback; None leaves them out.
         log: the feedback log of another session, to continue it.
+
+    Attributes:
+        is_ending: whether documents are refused because the service is ending.
     """
 
     def __init__(
@@ -72,9 +78,11 @@ class Session:
         self.clock = SessionClock(now)
         self.named = named
         self.closed = False
+        self.is_ending = False
         self.empty_since: float | None = now
         self.faces = CharacterFaces(settings)
         self.clips = AudioClips()
+        self._effects: list[Effect] = []
         self.player = Player(
             settings.play_options(scene),
             kinds=KINDS,
@@ -83,33 +91,30 @@ class Session:
             veto=lambda block, schedule: duration_error(block, schedule, settings),
         )
         self.broadcast = Broadcast(self.player, self.faces)
-        self.submission = Submission(id, settings, self.player, self._add_effects)
+        self.submission = Submission(id, settings, self.player, self._effects.extend)
         self.feedback_log = log or FeedbackLog(epoch)
-        self.connections = Connections(self.feedback_log, self._add_effects)
-        self._checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
-        self.journal = SessionJournal(id, self._checkpoint, self.connections, self.hand_over)
-        self._effects: list[Effect] = []
+        self.connections = Connections(self.feedback_log, self._effects.extend)
+        checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
+        self.journal = SessionJournal(id, checkpoint, self.connections, self.hand_over)
         self.subscriptions = Subscriptions(
             settings, self.player, self.faces, self.broadcast, self.connections
         )
+        self.tracked = TrackedFaces(self.player, self.connections, self._handle)
         self.queries = QueryHandlers(
             id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
         )
         self._controls = ControlHandlers(
-            self.player, self.faces, self.clips, self.submission, self.subscriptions, self.connections.reply
+            self.player,
+            self.faces,
+            self.clips,
+            self.submission,
+            self.subscriptions,
+            self.queries,
+            self.tracked,
+            self.connections.reply,
         )
         self.due = DueWork(
             self.clock, self.player, self.submission, self.broadcast, self.connections, self._controls
-        )
-        self.tracked = TrackedFaces(self.player, self.connections, self._show)
-        self.inbox = Inbox(
-            self.player,
-            self.submission,
-            self.journal,
-            self.connections,
-            self.queries,
-            self._controls,
-            self.tracked,
         )
 
     # connections --------------------------------------------------------------------------------
@@ -121,7 +126,6 @@ class Session:
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
-        self.broadcast.quiet_until = -math.inf
         self.connections[connection] = Connection(
             connection, may_edit=may_edit and self.settings.edit is not None
         )
@@ -142,7 +146,6 @@ class Session:
         self._controls.on_disconnect(connection, self.clock.read(now))
         self.tracked.drop(connection)
         self.due.must_end_speech = True
-        self.broadcast.quiet_until = -math.inf
         if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
@@ -155,7 +158,6 @@ class Session:
     def close(self) -> None:
         """Close the session: it does and sends nothing any more."""
         self.closed = True
-        self.broadcast.quiet_until = -math.inf
         self.connections.clear()
         self.submission.queue.clear()
         self._effects.clear()
@@ -168,20 +170,60 @@ class Session:
     # messages in --------------------------------------------------------------------------------
 
     def receive(self, connection: int, message: str | bytes, now: float) -> None:
-        """Handle a message, as `Inbox.handle`."""
+        """Handle a message: a picture or sound in bytes, a control message that starts with `{`, or BML."""
         if self.closed or connection not in self.connections:
             return
         t = self.clock.read(now)
         self.due.send_before_change(t)
         if self.journal.writer.needs_checkpoint and not self.journal.compact(t):
             return
-        in_journal = self.inbox.handle(self.connections[connection], message, t)
+        in_journal = self._handle(connection, message, t)
         if not self.closed and self.due.work(t) and not in_journal:
             self.journal.note(t, "tick")
 
-    def _show(self, connection: int, message: str, t: float) -> None:
-        if connection in self.connections:
-            self.inbox.handle(self.connections[connection], message, t)
+    def _handle(self, id: int, message: str | bytes, t: float) -> bool:
+        """Handle a message. Return whether it was written to the journal."""
+        if (connection := self.connections.get(id)) is None:
+            return False
+        if isinstance(message, bytes) and self.tracked.receive(id, message, t):
+            return False
+        control: Control | None = None
+        if isinstance(message, str) and (text := message.lstrip("\ufeff \t\r\n")).startswith("{"):
+            parsed = parse_control(text, can_save=connection.may_edit)
+            if isinstance(parsed, ErrorMessage):
+                self.connections.reply(id, parsed)
+                return False
+            if isinstance(parsed, PASSING):
+                self._handle_passing(connection, parsed, t)
+                return False
+            control = parsed
+        is_bml = control is None and isinstance(message, str)
+        ending = "the service is ending and takes no more documents" if self.is_ending and is_bml else None
+        kind: Kind = "text" if isinstance(message, str) else "sound"
+        refused = ending or self.journal.accept(t, kind, id, message)
+        if refused is not None and is_bml:
+            # Without a number: the message is not in the journal, and a session that is restored from the
+            # journal must number all other feedback in the same way.
+            block = block_id_of(str(message))
+            warning = WarningFeedback(id=block, type="CANNOT_CREATE_BEHAVIOR", text=refused)
+            self.connections.send_feedback([warning.to_xml()])
+        elif refused is not None:
+            self.connections.reply(id, ErrorMessage(code="journal", message=refused))
+        elif isinstance(message, bytes):
+            self._controls.handle_sound(connection, message, t)
+        elif control is not None:
+            self._controls.handle(connection, control, t)
+        else:
+            self.submission.enqueue(message)
+        return refused is None
+
+    def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:
+        """Handle a message that is not written to the journal, except for the characters that it adds."""
+        known = self.player.characters
+        self._controls.handle(connection, control, t)
+        for name in self.player.characters:
+            if name not in known:  # their order matters: the first is the default
+                self.journal.note(t, "text", connection.id, json.dumps({"type": "character", "id": name}))
 
     # answers to effects -----------------------------------------------------------------------------
 
@@ -199,8 +241,7 @@ class Session:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
         if self.closed:
             return
-        picture = result if isinstance(result, bytes) else None
-        effects, viewers = self.broadcast.video.on_picture(draw, picture, self.connections.values())
+        effects, viewers = self.broadcast.video.on_picture(draw, result, self.connections.values())
         self._effects += effects
         if not isinstance(result, bytes):
             self.subscriptions.end_pictures(viewers, str(result))
@@ -212,11 +253,6 @@ class Session:
             return
         self.tracked.answer(connection, result, self.clock.read(now))
         self.tick(now)
-
-    def on_saved(self, connection: int, reply: Reply, now: float) -> None:
-        """Take the answer to an effect `Write`."""
-        if connection in self.connections:
-            self.connections.reply(connection, reply)
 
     # time ---------------------------------------------------------------------------------------
 
@@ -242,32 +278,13 @@ class Session:
         submission = self.submission
         return bool(submission.queue or submission.pending.blocks) or self.player.next_deadline() is not None
 
-    def _add_effects(self, effects: Iterable[Effect]) -> None:
-        self._effects += effects
-
     def take_effects(self) -> list[Effect]:
         """Return the effects since the last call, in order."""
-        effects, self._effects = self._effects, []
+        effects = self._effects.copy()
+        self._effects.clear()
         return effects
 
     # journal ----------------------------------------------------------------------------------------
-
-    def restore(self, parts: Mapping[str, str]) -> float:
-        """Restore the state and the connections of a checkpoint. The session must be new and opened at 0.
-
-        Args:
-            parts: the parts of the checkpoint, as in `SavedSession`.
-
-        Returns:
-            The time of the checkpoint on the session clock.
-
-        Raises:
-            JournalError: the parts are invalid, or of another version.
-        """
-        at, connections = self._checkpoint.read(self.id, parts)
-        for connection in connections:
-            self.connect(connection, at)
-        return at
 
     def hand_over(self, error: TakenOver) -> None:
         """Close all connections because another process has taken over; clients reconnect there."""
@@ -279,22 +296,5 @@ class Session:
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.writer.needs_checkpoint and not self.closed:
-            self.broadcast.quiet_until = -math.inf
             self.due.publish(t := self.clock.read(now))
             self.journal.compact(t)
-
-    def replay_until(
-        self, t: float, before: Callable[[float], None] = lambda t: None, *, since: float = 0.0
-    ) -> None:
-        """Publish the feedback that is due before `t`, each at its own time, for a replay.
-
-        Args:
-            before: called with each of those times, before the feedback is published.
-            since: the time of feedback that is due immediately.
-        """
-        while (due := self.player.next_deadline()) is not None and due < t and not self.closed:
-            due = max(due, since)
-            if self.clock.stands_still(due):
-                return  # it was published when the documents of a message had been planned
-            before(due)
-            self.due.publish(due)

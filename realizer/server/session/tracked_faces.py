@@ -11,14 +11,16 @@ from realizer.core.errors import RealizerError
 from realizer.playback.player import Player
 from realizer.protocol.messages.replies import ErrorMessage, Tracked
 from realizer.protocol.messages.requests import Track
+from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import HEADER
 from realizer.server.session.connections import Connections
-from realizer.server.session.control_fields import FieldError, character_index
+from realizer.server.session.control_fields import character_index
 from realizer.server.session.effects import Look
 
 if TYPE_CHECKING:
     from realizer.tracking.mirror import Mirror, Sight
 
+PICTURE = bytes([STREAMS["video"].kind or 0])  # first byte of a picture
 EARLY = 0.8  # of the time between two pictures; one that comes sooner is left out
 LEAST = 0.02  # a smaller action unit is not shown
 
@@ -47,29 +49,30 @@ class TrackedFaces:
 
     player: Player
     connections: Connections
-    show: Callable[[int, str, float], None]
+    show: Callable[[int, str, float], object]
     cameras: dict[int, _Camera] = field(default_factory=dict)  # by connection
 
     def start(self, connection: int, message: Track) -> None:
-        """Make a character follow the pictures of a connection; at 0 frames a second, no longer."""
+        """Make a character follow the pictures of a connection; at 0 frames a second, no longer.
+
+        Raises:
+            FieldError: the session has too many characters.
+        """
         from realizer.tracking.mirror import Mirror  # slow to load
 
         self.cameras.pop(connection, None)
         if message.fps:
-            try:
-                character_index(self.player, message.character)
-            except FieldError as error:
-                answer = ErrorMessage(code="invalid", message=str(error), where=f"track.{error.where}")
-                self.connections.reply(connection, answer)
-                return
+            character_index(self.player, message.character)
             self.cameras[connection] = _Camera(message.character, message.fps, Mirror())
 
     def drop(self, connection: int) -> None:
         """Forget the camera of a connection."""
         self.cameras.pop(connection, None)
 
-    def picture(self, connection: int, message: bytes, t: float) -> None:
-        """Look at a picture, or let it wait in the place of an earlier one."""
+    def receive(self, connection: int, message: bytes, t: float) -> bool:
+        """Look at a picture, or let it wait in the place of an earlier one; return False if it is none."""
+        if message[:1] != PICTURE:
+            return False
         camera = self.cameras.get(connection)
         if camera is None or len(message) <= HEADER.size:
             text = (
@@ -82,6 +85,7 @@ class TrackedFaces:
             _, _, _, number, _ = HEADER.unpack_from(message)
             camera.last, camera.is_busy, camera.waiting = (t, number), True, None
             self.connections.add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
+        return True
 
     def answer(self, connection: int, result: Sight | RealizerError | None, t: float) -> None:
         """Take what a picture shows; then look at the next one."""
@@ -106,4 +110,4 @@ class TrackedFaces:
             answer = Tracked(character=camera.character, frame=number, time=time, face=face, **seen)
             self.connections.reply(connection, answer)
         if camera.waiting is not None:
-            self.picture(connection, camera.waiting, t)
+            self.receive(connection, camera.waiting, t)

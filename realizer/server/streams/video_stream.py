@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable
 
+from realizer.core.errors import RealizerError
 from realizer.protocol.wire import pack
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Drawing, VideoSubscription, VideoView
@@ -62,9 +63,9 @@ class VideoStream:
         return min(times, default=math.inf)
 
     def on_picture(
-        self, draw: int, picture: bytes | None, connections: Iterable[Connection]
+        self, draw: int, picture: bytes | RealizerError, connections: Iterable[Connection]
     ) -> tuple[list[Effect], list[Connection]]:
-        """Take a picture, or None if it failed. Return what to send, and the view's connections."""
+        """Take a picture, or the error if it failed. Return what to send, and the view's connections."""
         view = next((v for v in self._views.values() if v.drawing and v.drawing.id == draw), None)
         if view is None or view.drawing is None:
             return [], []
@@ -76,7 +77,7 @@ class VideoStream:
                 if not isinstance(s, VideoSubscription) or s.view is not view:
                     continue
                 viewers.append(connection)
-                if picture is None or frame < s.next:
+                if not isinstance(picture, bytes) or frame < s.next:
                     continue
                 connection.dropped += frame - s.next + connection.is_slow
                 s.next = frame + 1

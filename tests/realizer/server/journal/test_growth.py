@@ -12,7 +12,7 @@ import pytest
 from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
-from realizer.server.journal.replay import restore_session
+from realizer.server.journal.replay import restore_checkpoint, restore_session
 from realizer.server.journal.session_journal import ENTRIES, LONG, JournalWriter
 from realizer.server.session.connections import LAST
 from realizer.server.session.effects import Send, Speak
@@ -194,6 +194,6 @@ def test_checkpoint_waits_for_pending_blocks_and_open_speeches() -> None:
 def test_checkpoint_that_cannot_be_read_is_an_error(state: str, why: str) -> None:
     session = Session("s", SETTINGS, 0.0, named=True)
     with pytest.raises(JournalError, match=f"the checkpoint of session s.*{why}"):
-        session.restore({"state": state})
+        restore_checkpoint(session, {"state": state})
     with pytest.raises(JournalError, match="the checkpoint of session s"):
         restore_session(session, SavedSession(0.0, [], {"clip:c": "{}"}), spoken)

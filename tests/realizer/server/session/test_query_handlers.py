@@ -95,7 +95,7 @@ def test_save_becomes_an_effect_whose_answer_the_client_gets(drive, tmp_path) ->
     driver.session.receive(2, json.dumps(SAVE), driver.opened)
     (effect,) = driver.session.take_effects()
     assert (effect.id, effect.message.name, effect.folder) == (2, "smirk", tmp_path)
-    driver.session.on_saved(2, save(effect), driver.opened)
+    driver.session.connections.reply(2, save(effect))
     driver.collect()
     (saved,) = driver.clients[2].of("saved")
     assert saved["file"] == "expressions/smirk.toml"

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.core.errors import VoiceError
 from realizer.offline import realize
+from realizer.protocol.wire import unpack
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import NOD, RATE, TALK, Driver, spoken
 from tests.worst_documents import document
@@ -483,3 +484,31 @@ def test_session_stretches_a_late_speech_to_its_end() -> None:
     times = {f.id: f.global_time for f in client.feedback if hasattr(f, "global_time")}
     assert times["b:s:end"] == pytest.approx(4.0)
     assert times["b:start"] == times["b:s:start"] == pytest.approx(0.6)
+
+
+# messages ---------------------------------------------------------------------------------------
+
+
+def test_session_answers_an_invalid_binary_message_with_an_error(driver) -> None:
+    client = driver.send(b"\x04\x01 sound")
+    assert client.of("error")[0]["code"] == "unsupported"
+
+
+def test_session_refuses_documents_while_the_service_ends(driver) -> None:
+    driver.session.is_ending = True
+    (warning,) = warnings(driver.send(NOD.format("b")))
+    assert "ending" in warning.text
+    assert warning.seq is None, "another service, that goes on with the session, would not count it"
+
+
+@pytest.mark.parametrize("message", ["ping", "state", "stop", "unsubscribe"])
+def test_receive_sends_what_is_due_before_it_handles_a_late_message(driver, message) -> None:
+    driver.send(FAP | {"fps": 25})
+    driver.send('<bml id="b"><wait id="w" duration="0.5"/></bml>')
+    client = driver.run(0.49)
+    before, driver.now = len(client.messages), 0.53  # nobody has woken it at 0.5 and at 0.52
+    driver.send({"type": message, "stream": "fap"} if message == "unsubscribe" else {"type": message})
+    point, end, frame = client.messages[before : before + 3]
+    assert 'id="b:w:end"' in point
+    assert 'status="DONE"' in end
+    assert unpack(frame).frame == 13
