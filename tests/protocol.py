@@ -17,7 +17,7 @@ from pydantic.json_schema import models_json_schema
 
 import realizer
 from realizer.protocol.messages.common import ANSWERS, PROTOCOL
-from realizer.protocol.messages.parse import SUPPORTED, Control
+from realizer.protocol.messages.parse import SUPPORTED
 from realizer.protocol.messages.replies import (
     ErrorCode,
     ErrorMessage,
@@ -31,7 +31,7 @@ from realizer.protocol.messages.replies import (
     Subscribed,
     Welcome,
 )
-from realizer.protocol.messages.requests import Subscribe
+from realizer.protocol.messages.requests import Control, Subscribe
 from realizer.protocol.streams import JSON_STREAMS, KINDS, STREAMS
 from realizer.protocol.wire import FINAL, FLUSH, VERSION
 from realizer.protocol.wire import HEADER as BYTES
@@ -44,8 +44,7 @@ SCRIPT = Path(__file__).parent.parent / "clients" / "javascript" / "src" / "fram
 SCRIPT_MARKS = ("// protocol: written by python -m tests.protocol", "// end of protocol")
 
 REQUESTS: dict[str, type[BaseModel]] = {
-    model.model_fields["type"].annotation.__args__[0]: model  # type: ignore[union-attr]
-    for model in get_args(Control)
+    model.model_fields["type"].annotation.__args__[0]: model for model in get_args(Control)
 }
 REPLIES: dict[str, type[BaseModel]] = {
     "welcome": Welcome,

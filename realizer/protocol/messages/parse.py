@@ -10,43 +10,12 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
-from realizer.protocol.messages.requests import (
-    Anticipate,
-    CharacterMessage,
-    Heard,
-    Hello,
-    Ping,
-    Save,
-    SceneMessage,
-    SetMessage,
-    StateQuery,
-    Stop,
-    Subscribe,
-    Track,
-    Unsubscribe,
-)
-from realizer.protocol.messages.speech import SpeechMessage
+from realizer.protocol.messages.requests import Control
 from realizer.protocol.streams import STREAMS
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-Control = (
-    Hello
-    | Subscribe
-    | Unsubscribe
-    | SceneMessage
-    | CharacterMessage
-    | SetMessage
-    | Heard
-    | Track
-    | Save
-    | Anticipate
-    | SpeechMessage
-    | Stop
-    | StateQuery
-    | Ping
-)
 SUPPORTED: tuple[str, ...] = tuple(
     get_args(model.model_fields["type"].annotation)[0] for model in get_args(Control)
 )

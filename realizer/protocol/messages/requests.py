@@ -1,4 +1,4 @@
-"""Control messages of clients, except `speech`."""
+"""Control messages of clients."""
 
 from typing import Annotated, Any, Literal
 
@@ -16,6 +16,7 @@ from realizer.protocol.messages.common import (
     Whole,
     examples,
 )
+from realizer.protocol.messages.speech import SpeechMessage
 
 FeedbackElement = Literal["blockProgress", "syncPointProgress", "predictionFeedback", "warningFeedback"]
 Side = Annotated[int, Field(ge=16), WHOLE]
@@ -267,3 +268,21 @@ class Ping(Message):
 
     type: Literal["ping"]
     id: Whole | str | None = None
+
+
+Control = (
+    Hello
+    | Subscribe
+    | Unsubscribe
+    | SceneMessage
+    | CharacterMessage
+    | SetMessage
+    | Heard
+    | Track
+    | Save
+    | Anticipate
+    | SpeechMessage
+    | Stop
+    | StateQuery
+    | Ping
+)

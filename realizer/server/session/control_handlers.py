@@ -7,11 +7,11 @@ from typing import get_args
 from realizer.core.errors import FaceError, VoiceError
 from realizer.playback.player import Player
 from realizer.protocol.messages.common import Reply
-from realizer.protocol.messages.parse import Control
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
 from realizer.protocol.messages.requests import (
     Anticipate,
     CharacterMessage,
+    Control,
     Heard,
     SceneMessage,
     SetMessage,

@@ -17,8 +17,9 @@ from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.playback.player import Player
-from realizer.protocol.messages.parse import Control, parse_control
+from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
+from realizer.protocol.messages.requests import Control
 from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import TakenOver
