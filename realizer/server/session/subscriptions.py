@@ -65,12 +65,19 @@ class Subscriptions:
         else:
             index = character_index(self.player, message.character)
             key = self._key(message)
-            # All other streams consist of frames.
-            make = {"schedule": self._schedule, "audio": self._audio, "video": self._video}.get(
-                stream, self._frames
-            )
             old = connection.subscriptions.get(key)
-            connection.subscriptions[key], fields = make(connection, message, index, old, t)
+            if stream == "schedule":
+                new: Subscription = ScheduleSubscription(
+                    None if message.character is None else index, message.character
+                )
+                fields = {}
+            elif stream == "audio":
+                new, fields = self._audio(message, index, old, t)
+            elif stream == "video":
+                new, fields = self._video(connection, message, index, old, t)
+            else:
+                new, fields = self._frames(message, index, old, t)
+            connection.subscriptions[key] = new
         fields |= {"stream": stream, "encoding": encoding, "character": message.character}
         self.connections.reply(connection.id, Subscribed(**fields))
 
@@ -101,14 +108,7 @@ class Subscriptions:
 
     # one method for each kind of stream -----------------------------------------------------------
 
-    def _schedule(
-        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
-    ) -> _Answer:
-        return ScheduleSubscription(None if message.character is None else index, message.character), {}
-
-    def _audio(
-        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
-    ) -> _Answer:
+    def _audio(self, message: Subscribe, index: int, old: Subscription | None, t: float) -> _Answer:
         heard = None if message.character is None else index
         new = self.broadcast.subscribe_audio(heard, message.rate, t)
         if isinstance(old, AudioSubscription) and old.sound is new.sound:
@@ -136,9 +136,7 @@ class Subscriptions:
             "media_type": PICTURES[message.format],
         }
 
-    def _frames(
-        self, connection: Connection, message: Subscribe, index: int, old: Subscription | None, t: float
-    ) -> _Answer:
+    def _frames(self, message: Subscribe, index: int, old: Subscription | None, t: float) -> _Answer:
         stream, fps = message.stream, message.fps or self.settings.fps
         encoding = message.encoding or STREAMS[stream].encodings[0]
         ahead: Any = {"ahead": message.ahead} if message.ahead else {}

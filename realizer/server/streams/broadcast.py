@@ -149,8 +149,7 @@ class Fanout:
             connection.dropped += s.drop_until(min(oldest, newest + 1))
             if (message := s.message(newest, now, is_slow=is_slow)) is not None:
                 sends.append(Send(connection.id, message))
-        window = self.timeline.latest_window
-        if window is not None and window.has_source:
+        if (window := self.timeline.latest_window) is not None:
             self._drop_source(window)
         return taken_back
 

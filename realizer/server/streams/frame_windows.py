@@ -15,7 +15,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import FapMapping, standard, to_fap
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses
-from realizer.core.array_types import Float32, Float64, Int16, Int32
+from realizer.core.array_types import Float32, Int16, Int32
 from realizer.playback.player import Player
 from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import json_frame, pack, pack_frames
@@ -81,20 +81,6 @@ def last_frame_at(now: float, fps: float) -> int:
     return math.floor((now + EPSILON) * fps)
 
 
-class PackedFrames:
-    """The binary messages of frames `first` .. `end - 1`, encoded in one call; each is a slice."""
-
-    def __init__(
-        self, stream: str, first: int, times: Float64, rows: Float32 | Int32, character: int
-    ) -> None:
-        self.first, self.end = first, first + len(rows)
-        self._bytes, self._size = pack_frames(stream, first, times, rows, character=character)
-
-    def __getitem__(self, frame: int) -> bytes:
-        at = (frame - self.first) * self._size
-        return self._bytes[at : at + self._size]
-
-
 class FrameWindow:
     """Frames `first` .. `first + count - 1` of a timeline; each stream of them is computed on first use."""
 
@@ -105,12 +91,10 @@ class FrameWindow:
         self._mapping = mapping
         self._times = np.arange(first, self.end) / timeline.fps
         self._aus: AUFrames | None = None
-        self._packed: dict[tuple[str, bool], PackedFrames] = {}
+        self._packed: dict[tuple[str, bool], tuple[bytes, int]] = {}
         self._rows: dict[tuple[str, bool], Float32 | Int32] = {}
-        # (stream, encoding, raw, name, whether several rows) -> (first row, last row, flush), message
-        self._latest: dict[
-            tuple[str, str, bool, str | None, bool], tuple[tuple[int, int, bool], str | bytes]
-        ] = {}
+        # (stream, encoding, raw, name) -> frame, or (first row, last row, flush), and its message
+        self._latest: dict[tuple[str, str, bool, str | None], tuple[object, str | bytes]] = {}
         self._meshes: Int16 | None = None
         self._meshes_from = 0
 
@@ -121,11 +105,6 @@ class FrameWindow:
             self._aus = self._timeline.player.frames(self._times, self._timeline.character)
         return self._aus
 
-    @property
-    def has_source(self) -> bool:
-        """Whether the AUs are in memory."""
-        return self._aus is not None
-
     def drop_source(self, subscriptions: Iterable[FrameSubscription] = ()) -> None:
         """Compute what the subscriptions need, and free the AUs, which are several times as large."""
         if self._aus is None:
@@ -134,7 +113,7 @@ class FrameWindow:
             if s.stream == "mesh":
                 _ = self.poses
             elif s.encoding == "binary" and not s.ahead:
-                self.packed(s)
+                self._all_packed(s)
             else:
                 self.rows(s, self.first, self.end)
         self._aus = None
@@ -148,28 +127,32 @@ class FrameWindow:
         """Return the WebSocket message of a frame."""
         s = subscription
         if s.encoding == "binary" and s.stream != "mesh":
-            return self.packed(s)[frame]
-        key, span = (s.stream, s.encoding, s.raw, s.name, False), (frame, frame, False)
-        known, message = self._latest.get(key, (None, b""))
-        if known != span:
-            message = self._encode(s, frame)
-            self._latest[key] = (span, message)
-        return message
+            data, size = self._all_packed(s)
+            at = (frame - self.first) * size
+            return data[at : at + size]
+        return self._once(s, frame, lambda: self._encode(s, frame))
 
     def rows_message(
         self, subscription: FrameSubscription, first: int, last: int, *, flush: bool
     ) -> str | bytes:
         """Return the WebSocket message of the rows `first` .. `last` of fap, au or arkit."""
         s = subscription
-        key, span = (s.stream, s.encoding, s.raw, s.name, True), (first, last, flush)
-        known, message = self._latest.get(key, (None, b""))
-        if known != span:
+
+        def encode() -> str | bytes:
             rows, time = self.rows(s, first, last + 1), first / self._timeline.fps
             if s.encoding == "binary":
                 data = rows.astype(STREAMS[s.stream].dtype, copy=False).tobytes()
-                message = pack(s.stream, first, time, data, character=s.index, flush=flush)
-            else:
-                message = json_frame(s.stream, first, time, _listed(rows), s.name, flush=flush)
+                return pack(s.stream, first, time, data, character=s.index, flush=flush)
+            return json_frame(s.stream, first, time, _listed(rows), s.name, flush=flush)
+
+        return self._once(s, (first, last, flush), encode)
+
+    def _once(self, s: FrameSubscription, span: object, encode: Callable[[], str | bytes]) -> str | bytes:
+        """Return the message of a frame or of several rows, encoded once for all subscribers in turn."""
+        key = (s.stream, s.encoding, s.raw, s.name)
+        known, message = self._latest.get(key, (None, b""))
+        if known != span:
+            message = encode()
             self._latest[key] = (span, message)
         return message
 
@@ -181,16 +164,15 @@ class FrameWindow:
         part: Float32 | Int32 = rows[first - self.first : end - self.first]
         return part
 
-    def packed(self, subscription: FrameSubscription) -> PackedFrames:
-        """Return the binary messages of all frames of fap, au or arkit."""
+    def _all_packed(self, subscription: FrameSubscription) -> tuple[bytes, int]:
+        """Return the binary messages of all frames of fap, au or arkit, joined, and the length of one."""
         stream, raw = subscription.stream, subscription.raw
-        packed = self._packed.get((stream, raw))
-        if packed is None:
+        if (stream, raw) not in self._packed:
             rows = SOURCES[stream].rows(self.aus, self._mapping, raw)
-            packed = self._packed[stream, raw] = PackedFrames(
-                stream, self.first, self._times, rows, subscription.index
+            self._packed[stream, raw] = pack_frames(
+                stream, self.first, self._times, rows, character=subscription.index
             )
-        return packed
+        return self._packed[stream, raw]
 
     def _encode(self, subscription: FrameSubscription, frame: int) -> str | bytes:
         """Return the message of a single frame: meshes, and all streams in JSON."""
@@ -249,7 +231,8 @@ class FrameTimeline:
     def window(self, first: int, last: int) -> FrameWindow:
         """Return a window that contains the frames first .. last, and its whole length after them."""
         window = self.latest_window
-        if window is None or not self.is_current or first < window.first or last >= window.end:
+        # The frames may have changed since the window was computed.
+        if window is None or self._version != self.version or first < window.first or last >= window.end:
             if self._mapping is None:
                 self._mapping = self._find_mapping()
             count = math.ceil(self._seconds * self.fps) + last - first
@@ -261,11 +244,6 @@ class FrameTimeline:
     def version(self) -> int:
         """Increases whenever frames change that may have been computed before."""
         return self.player.version + self._face_changes
-
-    @property
-    def is_current(self) -> bool:
-        """Whether the frames have not changed since the window was computed."""
-        return self._version == self.version
 
     def invalidate(self) -> None:
         """Discard the window because the face has changed."""
