@@ -1,9 +1,9 @@
 """Message formats on a broker: their protocol, plain BML, and Asap's BML in JSON."""
 
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 from urllib.parse import quote, unquote_plus
 
 from bml_schema import WarningFeedback
@@ -33,37 +33,34 @@ class Disconnect:
 Action = Inbound | Message | Disconnect
 
 
-class MessageFormat(Protocol):
+class MessageFormat(ABC):
     """A message format of one session, which may keep state; `topic` is the topic it reads."""
 
     topic: str
 
     def hello(self) -> list[Message]:
         """Return the messages to send when the broker is connected."""
-        ...
+        return []
 
+    @abstractmethod
     def incoming(self, body: bytes) -> list[Action]:
         """Return the actions that a message of the topic asks for; [] if it is for other clients."""
-        ...
 
+    @abstractmethod
     def outgoing(self, feedback: str) -> list[Message]:
         """Return the messages to send for feedback of the session."""
-        ...
 
     def farewell(self) -> list[Message]:
         """Return the messages to send before the session ends."""
-        ...
+        return []
 
 
-class AsapXml:
+class AsapXml(MessageFormat):
     """Plain documents and feedback, one a message: Asap over ActiveMQ."""
 
     def __init__(self, topic: str, out: str) -> None:
         self.topic = topic
         self._out = out
-
-    def hello(self) -> list[Message]:
-        return []
 
     def incoming(self, body: bytes) -> list[Action]:
         try:
@@ -84,9 +81,6 @@ class AsapXml:
 
     def outgoing(self, feedback: str) -> list[Message]:
         return [Message(self._out, feedback)]
-
-    def farewell(self) -> list[Message]:
-        return []
 
 
 class AsapJson(AsapXml):

@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr, unescape
 from bml_schema import BlockProgress, PredictionFeedback, WarningFeedback, parse_feedback
 from bml_schema.errors import NOT_BML_1_0
 from realizer.server.transports.document_framing import DocumentFramer
-from realizer.server.transports.message_formats import Action, Disconnect, Inbound, Message
+from realizer.server.transports.message_formats import Action, Disconnect, Inbound, Message, MessageFormat
 
 # The names by which components of a VHMSG system know the realizer.
 COMPONENT = "renderer"
@@ -42,7 +42,7 @@ class _Speak:
         return f"{verb} {self.agent} {self.recipient} {self.id} {rest}".rstrip()
 
 
-class Vhmsg:
+class Vhmsg(MessageFormat):
     """The format of SmartBody and the Virtual Human Toolkit.
 
     It reads vrSpeak, and writes vrAgentBML and vrSpoke. The documents of a vrSpeak become blocks of the agent
