@@ -123,12 +123,8 @@ class RedisJournal:
         self._counts[session] = 0
 
     def add(self, session: str, entry: Entry) -> None:
-        with self._translate_errors():
-            known = self._counts.get(session, 0)
-            count = self._add(_keys(session), [self._owner, RETENTION, known, entry.line()])
-        if not count:
-            raise TakenOver(session)
-        self._counts[session] = count
+        known = self._counts.get(session, 0)
+        self._counts[session] = self._change(self._add, session, RETENTION, known, entry.line())
 
     def claim(self, session: str) -> SavedSession | None:
         with self._translate_errors():
@@ -140,16 +136,10 @@ class RedisJournal:
         return SavedSession.read(float(epoch), lines, dict(zip(parts[::2], parts[1::2], strict=True)))
 
     def note(self, session: str, text: str | None) -> None:
-        with self._translate_errors():
-            done = self._set_part(_keys(session), [self._owner, NOTE, text or ""])
-        if not done:
-            raise TakenOver(session)
+        self._change(self._set_part, session, NOTE, text or "")
 
     def replace(self, session: str, index: int, entry: Entry) -> None:
-        with self._translate_errors():
-            done = self._replace(_keys(session), [self._owner, NOTE, index, entry.line()])
-        if not done:
-            raise TakenOver(session)
+        self._change(self._replace, session, NOTE, index, entry.line())
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
         with self._translate_errors():
@@ -162,10 +152,7 @@ class RedisJournal:
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         deleted = [name for name, text in parts.items() if text is None]
         new = [word for name, text in parts.items() if text is not None for word in (name, text)]
-        with self._translate_errors():
-            done = self._compact(_keys(session), [self._owner, RETENTION, len(deleted), *deleted, *new])
-        if not done:
-            raise TakenOver(session)
+        self._change(self._compact, session, RETENTION, len(deleted), *deleted, *new)
         self._counts[session] = 0
 
     def end(self, session: str) -> None:
@@ -176,6 +163,14 @@ class RedisJournal:
     def close(self) -> None:
         with contextlib.suppress(*self._faults):
             self._store.close()
+
+    def _change(self, script: Any, session: str, *arguments: str | float) -> int:
+        """Run a script that changes a session, unless another process has taken it over."""
+        with self._translate_errors():
+            done = int(script(_keys(session), [self._owner, *arguments]))
+        if not done:
+            raise TakenOver(session)
+        return done
 
     @contextlib.contextmanager
     def _translate_errors(self, place: str = "") -> Iterator[None]:

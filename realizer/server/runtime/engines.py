@@ -89,16 +89,13 @@ class Engines:
 
     def drop(self, owner: Hashable) -> None:
         """Drop the requests of an owner that wait in the pools."""
-        self.tracking_pool.drop(owner)
-        self.speech_pool.drop(owner)
-        self.render_pool.drop(owner)
+        for pool in (self.tracking_pool, self.speech_pool, self.render_pool):
+            pool.drop(owner)
 
     def close(self) -> None:
         """Close all engines, and drop the requests that wait for them."""
-        self.file_pool.close()
-        self.tracking_pool.close()
-        self.speech_pool.close()
-        self.render_pool.close()
+        for pool in (self.file_pool, self.tracking_pool, self.speech_pool, self.render_pool):
+            pool.close()
         for voice in self._voices.values():
             voice.close()
         for slot in self._slots.values():

@@ -23,7 +23,7 @@ from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
 from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
-from realizer.server.journal import Entry, Journal, JournalError, SavedSession, TakenOver, journal_at
+from realizer.server.journal import Entry, Journal, JournalError, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
 from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.engines import Engines
@@ -99,7 +99,9 @@ class SessionFactory:
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
-        session.journal.writer = self._journal_writer(id, self.journal if named else None)
+        session.journal.writer = JournalWriter(
+            id, self.journal if named else None, self._recorder, on_stopped=self._on_recording_stopped
+        )
         try:
             session.journal.writer.begin(epoch)
         except JournalError as error:
@@ -143,7 +145,14 @@ class SessionFactory:
             log.exception("session %s cannot be resumed", name)
             raise JournalError(f"session {name} cannot be resumed: internal error") from None
         watch.write = lambda text: self._try_note(name, text)
-        session.journal.writer = self._journal_writer(name, self.journal, saved, watch.follow)
+        session.journal.writer = JournalWriter(
+            name,
+            self.journal,
+            self._recorder,
+            on_stopped=self._on_recording_stopped,
+            saved=saved,
+            follow=watch.follow,
+        )
         await loop.run_in_executor(None, session.journal.writer.resume, saved)
         at = await loop.run_in_executor(None, catch_up, session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
@@ -223,17 +232,8 @@ class SessionFactory:
         session.broadcast.overload = self.overload
         return session
 
-    def _journal_writer(
-        self,
-        id: str,
-        journal: Journal | None,
-        saved: SavedSession | None = None,
-        follow: Callable[[], bool] = lambda: False,
-    ) -> JournalWriter:
-        def on_stopped() -> None:
-            self._metrics.counts["records_stopped"] += 1
-
-        return JournalWriter(id, journal, self._recorder, on_stopped=on_stopped, saved=saved, follow=follow)
+    def _on_recording_stopped(self) -> None:
+        self._metrics.counts["records_stopped"] += 1
 
 
 @dataclass(eq=False)
