@@ -137,8 +137,8 @@ class SessionRunner:
     def leave(self, number: int) -> None:
         """Remove a closed connection."""
         left = self._registry.session_of.get(number)
-        if left is not None:
-            self.metrics.counts["frames_dropped"] += left.connections.dropped_count(number)
+        if left is not None and (connection := left.connections.get(number)) is not None:
+            self.metrics.counts["frames_dropped"] += connection.dropped
         self._registry.leave(number, self._loop.time())
         self._clients.pop(number, None)
 

@@ -5,15 +5,13 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from itertools import chain
-from pathlib import Path
 from typing import NamedTuple
 
 from bml_schema import Feedback, parse_feedback
 from realizer.core import work
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import Gap
-from realizer.protocol.messages.requests import Save
-from realizer.server.session.effects import Close, Effect, MoveConnection, RenderOptions, Send, Write
+from realizer.server.session.effects import Close, Effect, RenderOptions, Send
 from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
 
@@ -226,10 +224,6 @@ class Connections(dict[int, Connection]):
         """Whether one of them has a subscription to a stream."""
         return any(connection.subscriptions for connection in self.values())
 
-    def dropped_count(self, id: int) -> int:
-        """Return how many frames, pictures and packets a client missed because it was slow."""
-        return connection.dropped if (connection := self.get(id)) else 0
-
     def update_backlog(self, id: int, waiting: int) -> bool:
         """Take the number of unsent bytes of a client: a slow one misses frames, a stuck one is closed.
 
@@ -249,10 +243,6 @@ class Connections(dict[int, Connection]):
         if id in self:
             self.add_effects([Send(id, reply.text())])
 
-    def write(self, id: int, message: Save, folder: Path) -> None:
-        """Save a file for a connection, which gets the answer."""
-        self.add_effects([Write(id, message, folder)])
-
     def send_feedback(self, texts: list[str]) -> None:
         """Send feedback to all that want it."""
         for connection in self.values():
@@ -265,10 +255,6 @@ class Connections(dict[int, Connection]):
             self.reply(id, Gap(seen=seen, first=first))
             seen = first - 1
         self._send_feedback(self[id], self.log.since(seen + 1))
-
-    def move(self, id: int, session: str, seen: int | None) -> None:
-        """Move a connection to another session, where it gets all feedback after `seen`."""
-        self.add_effects([MoveConnection(id, session, seen)])
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
         if (filter := connection.feedback) is not None:

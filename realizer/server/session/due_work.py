@@ -42,13 +42,9 @@ class SessionClock:
         """End an instant, because blocks start at it: what happens next comes after it."""
         self._latest = max(self._latest, math.nextafter(t, math.inf))
 
-    def stand_still(self, t: float) -> None:
-        """Stand still at a time, for at most `STANDSTILL` or until `go_on`."""
+    def stand_still(self, t: float = -math.inf) -> None:
+        """Stand still at a time, for at most `STANDSTILL`, or go on."""
         self._instant = t
-
-    def go_on(self) -> None:
-        """Go on after standing still."""
-        self._instant = -math.inf
 
     def stands_still(self, t: float) -> bool:
         """Return whether it stands still at a time."""
@@ -58,13 +54,9 @@ class SessionClock:
         """Return the time at which it stands still, or else `t`."""
         return self._instant if self.stands_still(t) else t
 
-    def hold(self, t: float) -> None:
-        """Hold the blocks that start at a time, because more may arrive at this instant."""
+    def hold(self, t: float = -math.inf) -> None:
+        """Hold the blocks that start at a time, because more may arrive at this instant; or none."""
         self._held = t
-
-    def release(self) -> None:
-        """Hold no blocks."""
-        self._held = -math.inf
 
     def start_of(self, event: float) -> float:
         """Return when a block that is due at `event` starts: later if it is held for documents that wait."""
@@ -121,7 +113,7 @@ class DueWork:
             self.clock.stand_still(t)
         done = self.submission.work(t)
         if not self.submission.is_in_message:
-            self.clock.go_on()
+            self.clock.stand_still()
         return done
 
     @property
@@ -156,7 +148,7 @@ class DueWork:
         if not starts:
             self.clock.hold(t)
         else:
-            self.clock.release()
+            self.clock.hold()
             if t <= self.player.next_event <= t + EPSILON:
                 self.clock.end_instant(self.player.next_event)
         if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:

@@ -25,7 +25,10 @@ from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Connections
+from realizer.server.session.effects import MoveConnection, Write
 
+# The limits that are settings `max_NAME`.
+NAMED_LIMITS = [name for name in Limits.model_fields if hasattr(Settings, f"max_{name}")]
 Query = Hello | Save | StateQuery | Ping
 OFF = "wanted a service that saves files: `realizer serve --edit DIR`"
 BARRED = "wanted a token for all sessions"
@@ -69,7 +72,7 @@ class QueryHandlers:
             self.connections.reply(connection.id, error)
         elif message.session not in (None, self.id):
             assert message.session is not None
-            self.connections.move(connection.id, message.session, message.seen)
+            self.connections.add_effects([MoveConnection(connection.id, message.session, message.seen)])
         else:
             self.send_welcome(connection.id, t)
             if message.seen is not None:
@@ -81,7 +84,7 @@ class QueryHandlers:
             error = ErrorMessage(code="edit", message=OFF if folder is None else BARRED, where="save")
             self.connections.reply(connection.id, error)
         else:
-            self.connections.write(connection.id, message, folder)
+            self.connections.add_effects([Write(connection.id, message, folder)])
 
     def _state(self, connection: Connection, t: float) -> StateMessage:
         state = self.player.state(t)
@@ -122,20 +125,11 @@ def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mappin
             },
         ),
         limits=Limits(
-            message=s.max_message,
-            document=s.max_document,
+            **{name: getattr(s, f"max_{name}") for name in NAMED_LIMITS},
             control=MAX_CONTROL,
             content=MAX_CONTENT,
-            behaviours=s.max_behaviours,
-            elements=s.max_elements,
-            duration=s.max_duration,
-            speech=s.max_speech,
-            blocks=s.max_blocks,
             characters=MAX_CHARACTERS,
-            connections=s.max_connections,
-            rate=s.max_rate,
             picture=s.max_size,
-            pixels=s.max_pixels,
             fps=MAX_FPS,
             keep=s.keep,
         ),

@@ -85,7 +85,7 @@ def test_present_stands_still_for_a_while() -> None:
     clock.stand_still(1.0)
     times = (0.9, 1.0, 1.0 + STANDSTILL, 1.01 + STANDSTILL)
     assert [clock.present(t) for t in times] == [0.9, 1.0, 1.0, 1.01 + STANDSTILL]
-    clock.go_on()
+    clock.stand_still()
     assert clock.present(1.05) == 1.05
     assert not clock.stands_still(1.0)
 
@@ -94,7 +94,7 @@ def test_start_of_a_held_event_is_after_the_standstill() -> None:
     clock = SessionClock(0.0)
     clock.hold(1.0)
     assert [clock.start_of(t) for t in (0.5, 1.0, 1.5)] == [1.0 + STANDSTILL, 1.0 + STANDSTILL, 1.5]
-    clock.release()
+    clock.hold()
     assert clock.start_of(1.0) == 1.0
 
 
