@@ -10,7 +10,7 @@ import shutil
 from collections.abc import AsyncIterator, Callable
 from functools import partial
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
@@ -29,9 +29,6 @@ from realizer.server.http.page_tools import MAX_TEXT
 from realizer.server.http.requests import SOCKETS, session_of
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.sources import document_of
-
-if TYPE_CHECKING:
-    pass
 
 KEEP_ALIVE = 15.0  # s; proxies close connections in which nothing comes
 MOST_UNREAD = 10_000  # messages; a client that reads no more of its feedback is disconnected

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-from collections import deque
 from collections.abc import Callable, Mapping
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
@@ -27,9 +26,8 @@ class AsgiClient:
         self._limiter = RateLimiter(settings.max_rate)
         self._most = settings.max_message
         self._warn: Callable[[str], None] = lambda notice: None
-        self._queue: deque[str | bytes] = deque()
+        self._queue: asyncio.Queue[str | bytes | None] = asyncio.Queue()  # None after the last message
         self._unsent = 0
-        self._changed = asyncio.Condition()
         self._ending = False
         self._end: asyncio.Task[None] | None = None
         self._writing = asyncio.create_task(self._write())
@@ -43,14 +41,12 @@ class AsgiClient:
 
     def send(self, data: str | bytes) -> None:
         if not self._ending and self.close_code is None:
-            self._queue.append(data)
+            self._queue.put_nowait(data)
             self._unsent += len(data)
-            self._wake()
 
     async def send_all(self, text: str | bytes) -> None:
         self.send(text)
-        async with self._changed:
-            await self._changed.wait_for(lambda: not self._unsent or self.close_code is not None)
+        await self._queue.join()
 
     async def receive(self) -> str | bytes | None:
         if self.close_code is not None or self._socket.client_state is not WebSocketState.CONNECTED:
@@ -58,7 +54,6 @@ class AsgiClient:
         message = await self._socket.receive()
         if message["type"] == "websocket.disconnect":
             self.close_code = message.get("code", 1005)
-            self._wake()
             return None
         text, data = message.get("text"), message.get("bytes")
         got: str | bytes = (data or b"") if text is None else text
@@ -77,7 +72,7 @@ class AsgiClient:
     async def close(self, code: int, reason: str) -> None:
         """Send what waits, at most for `GOODBYE` seconds, and close the connection."""
         self._ending = True
-        self._wake()
+        self._queue.put_nowait(None)
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(GOODBYE):
                 await asyncio.shield(self._writing)
@@ -97,27 +92,16 @@ class AsgiClient:
             if task is not None:
                 await asyncio.gather(task, return_exceptions=True)
 
-    def _wake(self) -> None:
-        asyncio.get_running_loop().create_task(self._notify())
-
-    async def _notify(self) -> None:
-        async with self._changed:
-            self._changed.notify_all()
-
     async def _write(self) -> None:
-        while True:
-            async with self._changed:
-                await self._changed.wait_for(
-                    lambda: bool(self._queue) or self._ending or self.close_code is not None
-                )
-            if self.close_code is not None or not self._queue:
-                return
-            data = self._queue.popleft()
+        while (data := await self._queue.get()) is not None:
             try:
-                await (
-                    self._socket.send_text(data) if isinstance(data, str) else self._socket.send_bytes(data)
-                )
+                if self.close_code is None:
+                    await (
+                        self._socket.send_text(data)
+                        if isinstance(data, str)
+                        else self._socket.send_bytes(data)
+                    )
             except (RuntimeError, WebSocketDisconnect):
                 self.close_code = self.close_code or 1006
             self._unsent -= len(data)
-            await self._notify()
+            self._queue.task_done()
