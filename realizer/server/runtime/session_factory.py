@@ -7,9 +7,8 @@ import contextlib
 import functools
 import logging
 import time
-from collections.abc import Callable, Iterable, Mapping, MutableMapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
@@ -26,7 +25,6 @@ from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
 from realizer.server.journal.session_journal import JournalWriter
-from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.query_handlers import capabilities_of
@@ -234,64 +232,3 @@ class SessionFactory:
 
     def _on_recording_stopped(self) -> None:
         self._metrics.counts["records_stopped"] += 1
-
-
-@dataclass(eq=False)
-class SessionRestorer:
-    """Restores the sessions that other processes had.
-
-    Args:
-        keep: seconds for which clients may reconnect to a restored session.
-    """
-
-    factory: SessionFactory
-    engines: Engines
-    sessions: MutableMapping[str, Session]
-    keep: float
-    call: Callable[[Session, Callable[[], None]], object]
-    adopt: Callable[[Session, list[Speak]], None]
-    restoring: dict[str, asyncio.Task[None]] = field(default_factory=dict)
-    resumed: dict[str, float] = field(default_factory=dict)  # session -> end of `keep`; loop time
-
-    async def restore(self, name: str | None, seen: int | None = None) -> None:
-        """Take over a session of another process, before a client joins it.
-
-        Raises:
-            JournalError: the journal cannot be read, or the session not be restored.
-        """
-        if self.factory.journal is None or name is None:
-            return
-        if not self.is_live(name):
-            if name not in self.restoring:
-                self.restoring[name] = asyncio.create_task(self._restore(name, seen or 0))
-            await asyncio.shield(self.restoring[name])
-        session = self.sessions.get(name)
-        if session is not None and name in self.resumed and session.feedback_log.newest < (seen or 0):
-            self.call(session, partial(self._catch_up, session, seen or 0))
-
-    def is_live(self, name: str) -> bool:
-        """Whether the session plays here. One that another process has taken over may still be registered."""
-        session = self.sessions.get(name)
-        return session is not None and not session.closed
-
-    def expire(self, now: float) -> None:
-        """Forget the restored sessions to which clients have had time to reconnect."""
-        self.resumed = {name: end for name, end in self.resumed.items() if end > now}
-
-    async def _restore(self, name: str, seen: int) -> None:
-        try:
-            restored = await self.factory.restore(name, seen, self.engines.speak)
-            if restored is None:
-                return
-            session, unanswered = restored
-            self.sessions[name] = session
-            self.resumed[name] = asyncio.get_running_loop().time() + self.keep
-            self.adopt(session, unanswered)
-        finally:
-            del self.restoring[name]
-
-    def _catch_up(self, session: Session, seen: int) -> None:
-        from realizer.server.journal.replay import catch_up
-
-        now = asyncio.get_running_loop().time()
-        session.clock.opened -= catch_up(session, now, seen) - now

@@ -3,16 +3,16 @@
 import asyncio
 import contextlib
 import gc
-from collections.abc import Iterable
+from functools import partial
 
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
-from realizer.server.runtime.session_factory import SessionFactory, SessionRestorer
+from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import ANYBODY, Visitor, worker_of
 from realizer.server.runtime.session_runner import SessionRunner
-from realizer.server.session.effects import Close, Effect
+from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
 
 DRAIN_STEP = 0.05  # s; how often `drain` checks whether everything has ended
@@ -62,7 +62,7 @@ class SessionHost(SessionRunner):
 
     def __init__(self, settings: Settings, worker: int | None = None) -> None:
         def is_local(session: str) -> bool:
-            if self._factory.journal is not None and not self._restorer.is_live(session):
+            if self._factory.journal is not None and not self._is_live(session):
                 return False  # another process may have it; only `restore`, before `join`, finds out
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
@@ -72,9 +72,9 @@ class SessionHost(SessionRunner):
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
         self._takeover_check: asyncio.Task[None] | None = None
-        self._restorer = SessionRestorer(
-            self._factory, self._engines, self._registry.sessions, settings.keep, self._call, self._adopt
-        )
+        self._restoring: dict[str, asyncio.Task[None]] = {}
+        # Restored session -> end of the time in which clients may reconnect to it; loop time.
+        self._resumed: dict[str, float] = {}
 
     async def start(self) -> None:
         """Load what all sessions share.
@@ -144,12 +144,43 @@ class SessionHost(SessionRunner):
         self._registry.check(name, visitor)
 
     async def restore(self, name: str | None, seen: int | None = None) -> None:
-        """Take over a session of another process; raises as `SessionRestorer.restore`."""
-        await self._restorer.restore(name, seen)
+        """Take over a session of another process, before a client joins it.
 
-    def _adopt(self, session: Session, unanswered: Iterable[Effect]) -> None:
-        self._run(session, unanswered)
-        self._apply_effects(session)
+        Raises:
+            JournalError: the journal cannot be read, or the session not be restored.
+        """
+        if self._factory.journal is None or name is None:
+            return
+        if not self._is_live(name):
+            if name not in self._restoring:
+                self._restoring[name] = asyncio.create_task(self._restore(name, seen or 0))
+            await asyncio.shield(self._restoring[name])
+        session = self._registry.sessions.get(name)
+        if session is not None and name in self._resumed and session.feedback_log.newest < (seen or 0):
+            self._call(session, partial(self._catch_up, session, seen or 0))
+
+    def _is_live(self, name: str) -> bool:
+        """Whether the session plays here. One that another process has taken over may still be registered."""
+        session = self._registry.sessions.get(name)
+        return session is not None and not session.closed
+
+    async def _restore(self, name: str, seen: int) -> None:
+        try:
+            restored = await self._factory.restore(name, seen, self._engines.speak)
+            if restored is not None:
+                session, unanswered = restored
+                self._registry.sessions[name] = session
+                self._resumed[name] = self._loop.time() + self.settings.keep
+                self._run(session, unanswered)
+                self._apply_effects(session)
+        finally:
+            del self._restoring[name]
+
+    def _catch_up(self, session: Session, seen: int) -> None:
+        from realizer.server.journal.replay import catch_up
+
+        now = self._loop.time()
+        session.clock.opened -= catch_up(session, now, seen) - now
 
     def leave(self, number: int) -> None:
         super().leave(number)
@@ -195,7 +226,7 @@ class SessionHost(SessionRunner):
         now = self._loop.time()
         self._overload.end_if_over(now)
         self._registry.remove_expired(now)
-        self._restorer.expire(now)
+        self._resumed = {name: end for name, end in self._resumed.items() if end > now}
         # Spread the checkpoints over the time until the next call.
         grown = [
             session for session in self._registry.sessions.values() if session.journal.writer.needs_checkpoint

@@ -218,9 +218,8 @@ class SessionRegistry:
 
     @staticmethod
     def _welcome(joined: Session, move: MoveConnection, now: float) -> None:
-        joined.queries.send_welcome(move.connection, joined.clock.read(now))
-        if move.seen is not None and not joined.closed:
-            joined.connections.send_missed_feedback(move.connection, move.seen)
+        if not joined.closed:  # another process may have taken it over meanwhile
+            joined.queries.send_welcome(move.connection, joined.clock.read(now), move.seen)
 
     def _refusal(self, move: MoveConnection, left: Session, visitor: Visitor) -> str | None:
         if not self._is_local(move.session):

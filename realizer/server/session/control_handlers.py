@@ -6,20 +6,9 @@ from typing import get_args
 
 from realizer.core.errors import FaceError, VoiceError
 from realizer.playback.player import Player
+from realizer.protocol.messages import requests
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
-from realizer.protocol.messages.requests import (
-    Anticipate,
-    CharacterMessage,
-    Control,
-    Heard,
-    SceneMessage,
-    SetMessage,
-    Stop,
-    Subscribe,
-    Track,
-    Unsubscribe,
-)
 from realizer.protocol.messages.speech import SpeechMessage
 from realizer.protocol.wire import ClipPiece, WireError, unpack_clip
 from realizer.server.documents.document_queue import Submission
@@ -33,7 +22,7 @@ from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, hea
 from realizer.server.speech.speech_streams import PATIENCE
 
 # Messages that affect only their own connection: they are not written to the journal.
-PASSING = (*get_args(Query), Subscribe, Unsubscribe, Track)
+PASSING = (*get_args(Query), requests.Subscribe, requests.Unsubscribe, requests.Track)
 
 
 @dataclass(eq=False)
@@ -49,7 +38,7 @@ class ControlHandlers:
     tracked: TrackedFaces
     reply: Callable[[int, Reply], None]
 
-    def handle(self, connection: Connection, message: Control, t: float) -> None:
+    def handle(self, connection: Connection, message: requests.Control, t: float) -> None:
         """Handle a control message, or reply with an error and change nothing (`stop`: see `_stop`)."""
         characters = self.player.characters
         id = message.id if isinstance(message, SpeechMessage) else None
@@ -67,30 +56,30 @@ class ControlHandlers:
         self.player.drop_characters(characters)
         self.reply(connection.id, answer)
 
-    def _handle(self, connection: Connection, message: Control, t: float) -> None:
+    def _handle(self, connection: Connection, message: requests.Control, t: float) -> None:
         match message:
-            case Subscribe():
+            case requests.Subscribe():
                 self.subscriptions.subscribe(connection, message, t)
-            case Unsubscribe():
+            case requests.Unsubscribe():
                 self.subscriptions.unsubscribe(connection, message)
-            case SceneMessage(objects=objects):
+            case requests.SceneMessage(objects=objects):
                 self.player.set_scene(
                     None if objects is None else {name: (p.x, p.y, p.z) for name, p in objects.items()}
                 )
-            case CharacterMessage():
+            case requests.CharacterMessage():
                 self._character(message)
-            case SetMessage():
+            case requests.SetMessage():
                 self._set(message, t)
-            case Heard(speaking=speaking, text=text):
+            case requests.Heard(speaking=speaking, text=text):
                 index = character_index(self.player, message.character)
                 self.player.hear(t, is_speaking=speaking, text=text, character=index)
-            case Anticipate():
+            case requests.Anticipate():
                 self.player.anticipate(message.id, message.syncs, t)
             case SpeechMessage():
                 self._speech(connection, message, t)
-            case Stop():
+            case requests.Stop():
                 self._stop(message, t)
-            case Track():
+            case requests.Track():
                 self.tracked.start(connection.id, message)
             case _:
                 self.queries.handle(connection, message, t)
@@ -147,7 +136,7 @@ class ControlHandlers:
         index = character_index(self.player, piece.id.removeprefix(HEARD) or None)
         self.player.hear_sound(sound, piece.rate, t, is_last=piece.final, character=index)
 
-    def _stop(self, message: Stop, t: float) -> None:
+    def _stop(self, message: requests.Stop, t: float) -> None:
         """End blocks. A block that has just ended by itself is no error.
 
         Unknown blocks are an error, but the others end: someone who stops a face must not hear it speak on.
@@ -182,7 +171,7 @@ class ControlHandlers:
             if is_arriving:
                 self._speak_parts(message.clip or "", t, is_last=False)
 
-    def _character(self, message: CharacterMessage) -> None:
+    def _character(self, message: requests.CharacterMessage) -> None:
         if message.face is not None:
             self.faces.check(message.face)
         if message.voice is not None:
@@ -196,7 +185,7 @@ class ControlHandlers:
         if message.voice is not None:
             self.submission.voices[index] = message.voice
 
-    def _set(self, message: SetMessage, t: float) -> None:
+    def _set(self, message: requests.SetMessage, t: float) -> None:
         index = character_index(self.player, message.character)
         values = direct_values(message, self.player.direct_names(index))
         if "emotion" in message.model_fields_set:

@@ -7,19 +7,8 @@ from typing import Any
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.playback.player import Player
+from realizer.protocol.messages import replies, requests
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL, MAX_FPS, PICTURES, PROTOCOL
-from realizer.protocol.messages.replies import (
-    BlockState,
-    Capabilities,
-    CharacterState,
-    ErrorMessage,
-    Limits,
-    Pong,
-    StateMessage,
-    VoiceState,
-    Welcome,
-)
-from realizer.protocol.messages.requests import Hello, Ping, Save, StateQuery
 from realizer.protocol.streams import STREAMS
 from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import MAX_CHARACTERS
@@ -28,8 +17,8 @@ from realizer.server.session.connections import Connection, Connections
 from realizer.server.session.effects import MoveConnection, Write
 
 # The limits that are settings `max_NAME`.
-NAMED_LIMITS = [name for name in Limits.model_fields if hasattr(Settings, f"max_{name}")]
-Query = Hello | Save | StateQuery | Ping
+NAMED_LIMITS = [name for name in replies.Limits.model_fields if hasattr(Settings, f"max_{name}")]
+Query = requests.Hello | requests.Save | requests.StateQuery | requests.Ping
 OFF = "wanted a service that saves files: `realizer serve --edit DIR`"
 BARRED = "wanted a token for all sessions"
 
@@ -49,91 +38,86 @@ class QueryHandlers:
     def handle(self, connection: Connection, message: Query, t: float) -> None:
         """Answer a message."""
         match message:
-            case Hello():
+            case requests.Hello():
                 self._hello(connection, message, t)
-            case StateQuery():
+            case requests.StateQuery():
                 self.connections.reply(connection.id, self._state(connection, t))
-            case Save():
+            case requests.Save():
                 self._save(connection, message)
-            case Ping():
-                self.connections.reply(connection.id, Pong(id=message.id, time=t))
+            case requests.Ping():
+                self.connections.reply(connection.id, replies.Pong(id=message.id, time=t))
 
-    def send_welcome(self, connection: int, t: float) -> None:
-        """Send `welcome` to a connection."""
-        seq = self.connections.log.newest
-        capabilities = {**self.capabilities, "edit": self.connections[connection].may_edit}
-        welcome = build_welcome(self.id, t, seq, self.settings, capabilities)
+    def send_welcome(self, connection: int, t: float, seen: int | None = None) -> None:
+        """Send `welcome` to a connection, and the feedback after `seen`."""
+        s = self.settings
+        changed: dict[str, Any] = {"edit": self.connections[connection].may_edit}
+        if s.edit is not None:  # the folder may have changed since the service began
+            changed["expressions"] = sorted(library_of(s.library_folder))
+        welcome = replies.Welcome(
+            session=self.id,
+            time=t,
+            seq=self.connections.log.newest,
+            capabilities=replies.Capabilities(
+                streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
+                pictures=list(PICTURES),
+                fps=s.fps,
+                corpus=s.corpus is not None,
+                **{**self.capabilities, **changed},
+            ),
+            limits=replies.Limits(
+                **{name: getattr(s, f"max_{name}") for name in NAMED_LIMITS},
+                control=MAX_CONTROL,
+                content=MAX_CONTENT,
+                characters=MAX_CHARACTERS,
+                picture=s.max_size,
+                fps=MAX_FPS,
+                keep=s.keep,
+            ),
+        )
         self.connections.reply(connection, welcome)
+        if seen is not None:
+            self.connections.send_missed_feedback(connection, seen)
 
-    def _hello(self, connection: Connection, message: Hello, t: float) -> None:
+    def _hello(self, connection: Connection, message: requests.Hello, t: float) -> None:
         if message.version != PROTOCOL:
             text = f"wanted version {PROTOCOL} of the protocol, got {message.version}"
-            error = ErrorMessage(code="version", message=text, where="hello.version")
+            error = replies.ErrorMessage(code="version", message=text, where="hello.version")
             self.connections.reply(connection.id, error)
         elif message.session not in (None, self.id):
             assert message.session is not None
             self.connections.add_effects([MoveConnection(connection.id, message.session, message.seen)])
         else:
-            self.send_welcome(connection.id, t)
-            if message.seen is not None:
-                self.connections.send_missed_feedback(connection.id, message.seen)
+            self.send_welcome(connection.id, t, message.seen)
 
-    def _save(self, connection: Connection, message: Save) -> None:
+    def _save(self, connection: Connection, message: requests.Save) -> None:
         folder = self.settings.edit
         if folder is None or not connection.may_edit:
-            error = ErrorMessage(code="edit", message=OFF if folder is None else BARRED, where="save")
+            error = replies.ErrorMessage(code="edit", message=OFF if folder is None else BARRED, where="save")
             self.connections.reply(connection.id, error)
         else:
             self.connections.add_effects([Write(connection.id, message, folder)])
 
-    def _state(self, connection: Connection, t: float) -> StateMessage:
+    def _state(self, connection: Connection, t: float) -> replies.StateMessage:
         state = self.player.state(t)
         preparing = [
-            BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
+            replies.BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
             for w in self.submission.pending.blocks
         ]
         characters = [
-            CharacterState(face=self.faces.name(index), voice=self.submission.voices.get(index), **face)
+            replies.CharacterState(
+                face=self.faces.name(index), voice=self.submission.voices.get(index), **face
+            )
             for index, face in enumerate(state["characters"])
         ]
-        return StateMessage(
+        return replies.StateMessage(
             session=self.id,
             time=t,
-            blocks=[*(BlockState(**block) for block in state["blocks"]), *preparing],
+            blocks=[*(replies.BlockState(**block) for block in state["blocks"]), *preparing],
             characters=characters,
-            voice=VoiceState(name=self.settings.voice, fault=self.submission.tts.fault),
+            voice=replies.VoiceState(name=self.settings.voice, fault=self.submission.tts.fault),
             connections=len(self.connections),
             dropped=connection.dropped,
         )
-
-
-def build_welcome(id: str, t: float, seq: int, s: Settings, capabilities: Mapping[str, Any]) -> Welcome:
-    """Return the answer to `hello`."""
-    return Welcome(
-        session=id,
-        time=t,
-        seq=seq,
-        capabilities=Capabilities(
-            streams={stream: list(row.encodings) for stream, row in STREAMS.items()},
-            pictures=list(PICTURES),
-            fps=s.fps,
-            corpus=s.corpus is not None,
-            # Those of a folder may have changed since the service began.
-            **{
-                **capabilities,
-                **({} if s.edit is None else {"expressions": sorted(library_of(s.library_folder))}),
-            },
-        ),
-        limits=Limits(
-            **{name: getattr(s, f"max_{name}") for name in NAMED_LIMITS},
-            control=MAX_CONTROL,
-            content=MAX_CONTENT,
-            characters=MAX_CHARACTERS,
-            picture=s.max_size,
-            fps=MAX_FPS,
-            keep=s.keep,
-        ),
-    )
 
 
 def capabilities_of(settings: Settings) -> dict[str, Any]:
