@@ -1,6 +1,7 @@
 """Xface messages: their XML, and a parser of tasks in a byte stream."""
 
 import re
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
@@ -110,110 +111,91 @@ class TaskReader:
     def __init__(self, limit: int) -> None:
         self._limit = limit
         self._data = bytearray()
-        self._looked = 0  # the open task has no end before it
-        self._lost = False  # inside a span whose fault is reported
-        self._size = 0  # bytes of a file that follow a task and are skipped
+        self._items: list[Task | Fault] = []
+        self._reading = self._read()
 
     def feed(self, data: bytes) -> list[Task | Fault]:
         """Return what `data` completes, in order."""
         self._data += data
-        items: list[Task | Fault] = []
-        while self._step(items):
-            pass
+        next(self._reading)
+        items, self._items = self._items, []
         return items
 
-    def _step(self, items: list[Task | Fault]) -> bool:
-        if self._size:
-            return self._skip_content()
-        if self._lost:
-            return self._skip()
-        if (passed := _PASSED.match(self._data)) is not None:
-            self._drop(passed.end())
-        if not self._data:
-            return False
-        if not _OPEN.match(self._data):
-            # It may be the beginning of `<task ` or of a declaration.
-            if len(self._data) < 6 and b"<task".startswith(bytes(self._data[:5])):
-                return False
-            if self._data.startswith((b"<?", b"\xef")) and len(self._data) < 200 and b"\0" not in self._data:
-                return False
-            shown = bytes(self._data[:_SHOWN]).split(b"\0")[0].decode("utf-8", "replace")
-            return self._give_up(f"wanted <task name=...>, got {shown!r}", items)
-        return self._in_task(items)
+    def _read(self) -> Iterator[None]:
+        """Read tasks; yield when more data is needed."""
+        while True:
+            if (passed := _PASSED.match(self._data)) is not None:
+                del self._data[: passed.end()]
+            if self._may_begin():
+                yield
+                continue
+            text, tag = yield from self._read_task()
+            if text:
+                self._items.append(Fault(text, _head(tag)))
+                del self._data[:1]  # at least the mark where parsing failed
+                while (bound := _BOUND.search(self._data)) is None:
+                    del self._data[: max(0, len(self._data) - 5)]
+                    yield
+                del self._data[: bound.start() if bound[0] != b"\0" else bound.end()]
 
-    def _in_task(self, items: list[Task | Fault]) -> bool:
-        start = _START.match(self._data)
-        if start is None:
+    def _may_begin(self) -> bool:
+        """Whether there may be the beginning of `<task ` or of a declaration, or nothing yet."""
+        data = self._data
+        if len(data) < 6 and b"<task".startswith(data[:5]):
+            return True
+        return data.startswith((b"<?", b"\xef")) and len(data) < 200 and b"\0" not in data
+
+    def _read_task(self) -> Generator[None, None, tuple[str, bytes]]:
+        """Read one task. Return its fault, or "", and the rest of its start tag."""
+        if not _OPEN.match(self._data):
+            shown = bytes(self._data[:_SHOWN]).split(b"\0")[0].decode("utf-8", "replace")
+            return f"wanted <task name=...>, got {shown!r}", b""
+        while (start := _START.match(self._data)) is None:
             bound = _BOUND.search(self._data, 5)
             if (bound.start() if bound is not None else len(self._data)) > LONGEST_TAG:
-                return self._give_up(f"wanted <task ...> of at most {LONGEST_TAG} bytes, got more", items)
-            if bound is None:
-                return False
-            return self._give_up("wanted > at the end of <task, got another beginning", items)
-        if start[1].endswith(b"/"):
-            self._tell(start[1][:-1], b"", start.end(), items)
-            return True
-        end = _END.search(self._data, max(start.end(), self._looked))
-        if end is None or not end[0].startswith(b"</"):
-            if end is not None:
-                got = "a NUL" if end[0] == b"\0" else "another <task"
-                return self._give_up(f"wanted </task>, got {got}: half a task", items, start[1])
+                return f"wanted <task ...> of at most {LONGEST_TAG} bytes, got more", b""
+            if bound is not None:
+                return "wanted > at the end of <task, got another beginning", b""
+            yield
+        tag, begin = start[1], start.end()
+        if tag.endswith(b"/"):
+            yield from self._take(tag[:-1], b"", begin)
+            return "", b""
+        too_large = f"wanted a task of at most {self._limit} bytes, got more"
+        looked = begin
+        while (end := _END.search(self._data, looked)) is None:
             if len(self._data) > self._limit:
-                return self._give_up(self._too_large, items, start[1])
-            self._looked = max(start.end(), len(self._data) - 80)  # part of an end may be there
-            return False
+                return too_large, tag
+            looked = max(begin, len(self._data) - 80)  # part of an end may be there
+            yield
+        if not end[0].startswith(b"</"):
+            got = "a NUL" if end[0] == b"\0" else "another <task"
+            return f"wanted </task>, got {got}: half a task", tag
         if end.end() > self._limit:
-            return self._give_up(self._too_large, items, start[1])
-        self._tell(start[1], bytes(self._data[start.end() : end.start()]), end.end(), items)
-        return True
+            return too_large, tag
+        yield from self._take(tag, bytes(self._data[begin : end.start()]), end.end())
+        return "", b""
 
-    def _tell(self, tag: bytes, body: bytes, end: int, items: list[Task | Fault]) -> None:
-        self._drop(end)
+    def _take(self, tag: bytes, body: bytes, end: int) -> Iterator[None]:
+        """Take a task, and skip the bytes of a file that follow it."""
+        del self._data[:end]
         task = replace(_head(tag), params=_params(body.decode("utf-8", "replace")))
         if not task.name:
             got = _values(tag).get("name", "")
-            items.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
+            self._items.append(Fault(f"wanted <task> with the name of a task, got {got[:64]!r}", _head(tag)))
             return
-        items.append(task)
+        self._items.append(task)
         if task.name != FOLLOWED or len(task.params) != 2:
             return
         size = task.params[1].strip()
         if not (size.isascii() and size.isdecimal() and len(size) < 12 and 0 < int(size) <= self._limit):
-            items.append(Fault(f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"))
+            words = f"{FOLLOWED}: wanted 1..{self._limit} bytes to follow, got {size[:20]!r}"
+            self._items.append(Fault(words))
             return
-        self._size = int(size)
-
-    def _skip_content(self) -> bool:
-        size = self._size + (self._data[:1] == b"\0")  # the terminator of the task; no sound file begins so
-        if len(self._data) < size:
-            return False
-        self._drop(size)
-        self._size = 0
-        return True
-
-    @property
-    def _too_large(self) -> str:
-        return f"wanted a task of at most {self._limit} bytes, got more"
-
-    def _give_up(self, text: str, items: list[Task | Fault], tag: bytes = b"") -> bool:
-        """Report a fault; `tag` is the rest of the start tag of the task that has it."""
-        items.append(Fault(text, _head(tag)))
-        self._lost = True
-        self._drop(1)  # at least the mark where parsing failed
-        return True
-
-    def _skip(self) -> bool:
-        bound = _BOUND.search(self._data)
-        if bound is None:
-            self._drop(max(0, len(self._data) - 5))
-            return False
-        self._lost = False
-        self._drop(bound.start() if bound[0] != b"\0" else bound.end())
-        return True
-
-    def _drop(self, count: int) -> None:
-        del self._data[:count]
-        self._looked = 0
+        # Behind the terminator of the task; no sound file begins so.
+        while len(self._data) < (left := int(size) + (self._data[:1] == b"\0")):
+            yield
+        del self._data[:left]
 
 
 def _values(tag: bytes) -> dict[str, str]:
