@@ -22,7 +22,6 @@ from realizer.server.journal import JournalError
 from realizer.server.journal import session_journal as thresholds
 from realizer.server.journal.entry import Entry, SavedSession
 from realizer.server.journal.replay import restore_session
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.session_registry import SessionRegistry
 from realizer.server.session.effects import Close, Draw, Effect, Send, Speak
 from realizer.server.session.session import Session
@@ -182,8 +181,8 @@ class Interleaving:
 
     def _make(self, id: str, now: float, named: bool) -> Session:
         session = Session(id, self._settings, now, named=named, epoch=EPOCH)
-        session.journal.writer = JournalWriter(id, self._journal if named else None)
-        session.journal.writer.begin(EPOCH)
+        session.journal.open(self._journal if named else None)
+        session.journal.begin(EPOCH)
         return session
 
     def run(self, steps: int) -> None:

@@ -27,7 +27,6 @@ from realizer.server.journal import Entry, Journal, SavedSession, journal_at
 from realizer.server.journal import session_journal as thresholds
 from realizer.server.journal.recordings import RecordingFolder
 from realizer.server.journal.replay import restore_session
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -95,8 +94,8 @@ def play(
 ) -> float:
     """Play documents; return the CPU milliseconds of one."""
     session = open_session()
-    session.journal.writer = JournalWriter("long", journal, record)
-    session.journal.writer.begin(0.0)
+    session.journal.open(journal, record)
+    session.journal.begin(0.0)
     session.connect(1, 0.0)
     session.receive(1, '{"type":"scene","objects":{"cup":{"x":0.2,"y":-0.1,"z":0.5}}}', 0.0)
     begin_time = time.process_time()

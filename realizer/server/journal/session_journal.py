@@ -1,10 +1,9 @@
-"""The journal of a session: the writer of its entries, and checkpoints of its state."""
+"""The journal of a session: its entries, and checkpoints of its state."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 from realizer.server.journal.checkpoint import Checkpoint
@@ -25,62 +24,130 @@ ENDLESS = 10_000
 AGAIN = 25
 
 
-class JournalWriter:
-    """A writer that appends a session's entries to its journal and its recording.
+class SessionJournal:
+    """The journal of a session, from which another process can take the session over, and its recording.
 
-    Its methods raise TakenOver if another process has taken the session over; `begin` and `append` raise
-    JournalError if the journal cannot be written.
+    It writes nowhere until `open`.
 
     Args:
-        journal: from which another process can resume the session, or None.
-        recorder: of the session for replay, or None. The session does not depend on it.
-        on_stopped: called when the recording has failed and stops.
-        follow: called after each entry, until it returns False.
+        on_taken_over: called when another process has taken the session over.
     """
 
     def __init__(
         self,
         session: str,
+        checkpoint: Checkpoint,
+        connections: Collection[int],
+        on_taken_over: Callable[[TakenOver], None],
+    ) -> None:
+        self.checkpoint = checkpoint
+        self._session = session
+        self._connections = connections
+        self._on_taken_over = on_taken_over
+        self._journal: Journal | None = None
+        self._recorder: RecordingFolder | None = None
+        self._failing = False
+        self._entries = self._bytes = 0
+
+    def open(
+        self,
         journal: Journal | None = None,
         recorder: RecordingFolder | None = None,
         *,
         on_stopped: Callable[[], None] = lambda: None,
-        saved: SavedSession | None = None,
         follow: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._session = session
+        """Write to a journal and a recording from now on; the next call is `begin` or `resume`.
+
+        Args:
+            journal: from which another process can resume the session, or None.
+            recorder: of the session for replay, or None. The session does not depend on it.
+            on_stopped: called when the recording has failed and stops.
+            follow: called after each entry, until it returns False.
+        """
         self._journal = journal
         self._recorder = recorder
         self._on_stopped = on_stopped
-        self._failing = False
         self._follow: Callable[[], bool] | None = follow
-        entries = [] if saved is None else saved.entries
-        self._entries = len(entries)
-        self._bytes = sum(len(entry.body) for entry in entries)
+
+    def begin(self, epoch: float) -> None:
+        """Add a new session; raises JournalError if the journal cannot be written."""
+        if self._journal is not None:
+            self._journal.begin(self._session, epoch)
+        self._record(lambda recorder: recorder.begin(self._session, epoch))
+
+    def resume(self, saved: SavedSession) -> None:
+        """Continue the journal and the recording of a session that was taken over."""
+        self._entries = len(saved.entries)
+        self._bytes = sum(len(entry.body) for entry in saved.entries)
+        self._record(lambda recorder: recorder.resume(self._session, saved))
 
     @property
     def needs_checkpoint(self) -> bool:
         """Whether a checkpoint is due."""
         return self._entries >= ENTRIES or self._bytes >= BYTES
 
-    @property
-    def is_far_too_long(self) -> bool:
-        """Whether a checkpoint was due long ago."""
-        return self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
+    def accept(self, t: float, kind: Kind, connection: int, message: str | bytes) -> str | None:
+        """Write a message. Return why it cannot be accepted, or None."""
+        try:
+            self._append(Entry(t, kind, connection, message))
+        except TakenOver as error:
+            self._on_taken_over(error)
+            return str(error)
+        except JournalError as error:
+            log.error("session %s: %s", self._session, error)
+            return f"this could not be written to the journal, so it is refused: {error}"
+        return None
 
-    def begin(self, epoch: float) -> None:
-        """Add a new session."""
-        if self._journal is not None:
-            self._journal.begin(self._session, epoch)
-        self._record(lambda recorder: recorder.begin(self._session, epoch))
+    def note(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
+        """Write an event that happens anyway. Only the first of several failures is logged.
 
-    def resume(self, saved: SavedSession) -> None:
-        """Continue the recording of a session that was taken over."""
-        self._record(lambda recorder: recorder.resume(self._session, saved))
+        Return False if another process has taken over the session.
+        """
+        entry = Entry(t, kind, number, body)
+        try:
+            self._append(entry)
+        except TakenOver as error:
+            self._on_taken_over(error)
+            return False
+        except JournalError as error:
+            self._log_failure(error)
+            self._entries = ENTRIES  # a checkpoint makes the missing entry unnecessary
+            self._record(lambda recorder: recorder.add(self._session, entry))
+        return True
 
-    def append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """Append an entry for an event that must not happen unless it is stored."""
-        entry = Entry(at, kind, number, body)
+    def compact(self, t: float) -> bool:
+        """Replace the journal by a checkpoint if nothing plays. All feedback due by `t` was published.
+
+        Return False if another process has taken over the session. Normally the face must be at rest too. If
+        the journal is far too long, this is not required: then a blink or a nod of the next seconds, which
+        depends on the last speech, may differ after a takeover.
+        """
+        is_far_too_long = self._entries >= LONG * ENTRIES or self._bytes >= LONG * BYTES
+        if not self.checkpoint.is_possible(t if is_far_too_long else float("-inf")):
+            return True
+        try:
+            parts = self.checkpoint.write(t, self._connections)
+            if self._journal is not None:
+                self._journal.compact(self._session, parts)
+        except TakenOver as error:
+            self._on_taken_over(error)
+            return False
+        except JournalError as error:
+            self._log_failure(error)
+            self._entries, self._bytes = ENTRIES - AGAIN, 0
+        else:
+            self._entries = self._bytes = 0
+            self.checkpoint.clips.settle()
+        return True
+
+    def end(self) -> None:
+        """End the session in the journal and the recording."""
+        for log_ in (self._journal, self._recorder):
+            if log_ is not None:
+                log_.end(self._session)
+
+    def _append(self, entry: Entry) -> None:
         if self._journal is not None:
             self._journal.add(self._session, entry)
             self._failing = False
@@ -92,37 +159,6 @@ class JournalWriter:
             if self._follow is not None and not self._follow():
                 self._follow = None
         self._record(lambda recorder: recorder.add(self._session, entry))
-
-    def try_append(self, at: float, kind: Kind, number: int = 0, body: str | bytes = "") -> None:
-        """Append an entry for an event that happens anyway. Only the first of several failures is logged."""
-        try:
-            self.append(at, kind, number, body)
-        except TakenOver:
-            raise
-        except JournalError as error:
-            self._log_failure(error)
-            self._entries = ENTRIES  # a checkpoint makes the missing entry unnecessary
-            self._record(lambda recorder: recorder.add(self._session, Entry(at, kind, number, body)))
-
-    def compact(self, parts: Mapping[str, str | None]) -> bool:
-        """Write a checkpoint. Return False if that fails; another one is due soon."""
-        try:
-            if self._journal is not None:
-                self._journal.compact(self._session, parts)
-        except TakenOver:
-            raise
-        except JournalError as error:
-            self._log_failure(error)
-            self._entries, self._bytes = ENTRIES - AGAIN, 0
-            return False
-        self._entries = self._bytes = 0
-        return True
-
-    def end(self) -> None:
-        """End the session in the journal and the recording."""
-        for log_ in (self._journal, self._recorder):
-            if log_ is not None:
-                log_.end(self._session)
 
     def _record(self, write: Callable[[RecordingFolder], None]) -> None:
         """Write to the recording. Stop at the first error: a recording with a gap cannot be replayed."""
@@ -140,54 +176,3 @@ class JournalWriter:
         if not self._failing:
             log.error("session %s: %s", self._session, error)
         self._failing = True
-
-
-@dataclass(eq=False)
-class SessionJournal:
-    """The journal of a session, from which another process can take the session over."""
-
-    session: str
-    checkpoint: Checkpoint
-    connections: Collection[int]
-    on_taken_over: Callable[[TakenOver], None]
-
-    def __post_init__(self) -> None:
-        self.writer = JournalWriter(self.session)  # at first it writes nowhere
-
-    def accept(self, t: float, kind: Kind, connection: int, message: str | bytes) -> str | None:
-        """Write a message. Return why it cannot be accepted, or None."""
-        try:
-            self.writer.append(t, kind, connection, message)
-        except TakenOver as error:
-            self.on_taken_over(error)
-            return str(error)
-        except JournalError as error:
-            log.error("session %s: %s", self.session, error)
-            return f"this could not be written to the journal, so it is refused: {error}"
-        return None
-
-    def note(self, t: float, kind: Kind, number: int = 0, body: str = "") -> bool:
-        """Write an event. Return False if another process has taken over the session."""
-        try:
-            self.writer.try_append(t, kind, number, body)
-        except TakenOver as error:
-            self.on_taken_over(error)
-            return False
-        return True
-
-    def compact(self, t: float) -> bool:
-        """Replace the journal by a checkpoint if nothing plays. All feedback due by `t` was published.
-
-        Return False if another process has taken over the session. Normally the face must be at rest too. If
-        the journal is far too long, this is not required: then a blink or a nod of the next seconds, which
-        depends on the last speech, may differ after a takeover.
-        """
-        if not self.checkpoint.is_possible(t if self.writer.is_far_too_long else float("-inf")):
-            return True
-        try:
-            if self.writer.compact(self.checkpoint.write(t, self.connections)):
-                self.checkpoint.clips.settle()
-        except TakenOver as error:
-            self.on_taken_over(error)
-            return False
-        return True

@@ -24,7 +24,6 @@ from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.query_handlers import capabilities_of
@@ -97,11 +96,10 @@ class SessionFactory:
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
-        session.journal.writer = JournalWriter(
-            id, self.journal if named else None, self._recorder, on_stopped=self._on_recording_stopped
-        )
+        journal = self.journal if named else None
+        session.journal.open(journal, self._recorder, on_stopped=self._on_recording_stopped)
         try:
-            session.journal.writer.begin(epoch)
+            session.journal.begin(epoch)
         except JournalError as error:
             raise JoinError(503, str(error)) from None
         return session
@@ -143,15 +141,10 @@ class SessionFactory:
             log.exception("session %s cannot be resumed", name)
             raise JournalError(f"session {name} cannot be resumed: internal error") from None
         watch.write = lambda text: self._try_note(name, text)
-        session.journal.writer = JournalWriter(
-            name,
-            self.journal,
-            self._recorder,
-            on_stopped=self._on_recording_stopped,
-            saved=saved,
-            follow=watch.follow,
+        session.journal.open(
+            self.journal, self._recorder, on_stopped=self._on_recording_stopped, follow=watch.follow
         )
-        await loop.run_in_executor(None, session.journal.writer.resume, saved)
+        await loop.run_in_executor(None, session.journal.resume, saved)
         at = await loop.run_in_executor(None, catch_up, session, at, seen)
         unanswered += [effect for effect in session.take_effects() if isinstance(effect, Speak)]
         now = loop.time()

@@ -228,9 +228,7 @@ class SessionHost(SessionRunner):
         self._registry.remove_expired(now)
         self._resumed = {name: end for name, end in self._resumed.items() if end > now}
         # Spread the checkpoints over the time until the next call.
-        grown = [
-            session for session in self._registry.sessions.values() if session.journal.writer.needs_checkpoint
-        ]
+        grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
         for k, session in enumerate(grown):
             self._loop.call_later(EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session)
         if self._takeover_check is None or self._takeover_check.done():

@@ -178,7 +178,7 @@ class SessionRegistry:
         for left in {connection, *session.connections} - joined:
             session.disconnect(left, now, is_awaited=bool(joined))
         if session.closed and self.sessions.get(session.id) is session:
-            session.journal.writer.end()
+            session.journal.end()
             self.remove(session)
 
     def remove(self, session: Session) -> None:
@@ -257,5 +257,5 @@ class SessionRegistry:
         """End a session; its connections stay until they leave."""
         self._cancel(session)
         session.close()
-        session.journal.writer.end()
+        session.journal.end()
         self.remove(session)

@@ -176,7 +176,7 @@ class Session:
             return
         t = self.clock.read(now)
         self.due.send_before_change(t)
-        if self.journal.writer.needs_checkpoint and not self.journal.compact(t):
+        if self.journal.needs_checkpoint and not self.journal.compact(t):
             return
         in_journal = self._handle(connection, message, t)
         if not self.closed and self.due.work(t) and not in_journal:
@@ -296,6 +296,6 @@ class Session:
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
-        if self.journal.writer.needs_checkpoint and not self.closed:
+        if self.journal.needs_checkpoint and not self.closed:
             self.due.publish(t := self.clock.read(now))
             self.journal.compact(t)

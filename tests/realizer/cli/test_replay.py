@@ -9,7 +9,6 @@ import pytest
 
 from realizer.core.settings import Settings
 from realizer.server.journal.recordings import RecordingFolder, recording_head
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.session import Session
 from tests.commands import run
 
@@ -21,16 +20,14 @@ NOD = '<bml id="a"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
 def record(tmp_path: Path) -> Path:
     """The recording of a session of one second."""
     session = Session("s", SETTINGS, 0.0, named=True, epoch=1e9)
-    session.journal.writer = JournalWriter(
-        "s", recorder=RecordingFolder(tmp_path, recording_head(SETTINGS, None))
-    )
-    session.journal.writer.begin(1e9)
+    session.journal.open(recorder=RecordingFolder(tmp_path, recording_head(SETTINGS, None)))
+    session.journal.begin(1e9)
     session.connect(1, 0.0)
     session.receive(1, NOD, 0.1)
     for step in range(3, 26):
         session.tick(0.04 * step)
     session.disconnect(1, 1.0)
-    session.journal.writer.end()
+    session.journal.end()
     (path,) = tmp_path.glob("*.jsonl")
     return path
 

@@ -27,7 +27,6 @@ from realizer.server.journal.checkpoint import (
     schedule_to_json,
 )
 from realizer.server.journal.replay import restore_session
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Speak
 from realizer.server.session.session import Session
 from realizer.speech.voice_activity import VoiceActivity
@@ -62,8 +61,8 @@ LASTING = (
 
 def opened(journal: Memory | None) -> Session:
     session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
-    session.journal.writer = JournalWriter("s", journal)
-    session.journal.writer.begin(EPOCH)
+    session.journal.open(journal)
+    session.journal.begin(EPOCH)
     return session
 
 
@@ -170,7 +169,8 @@ class Pair:
         assert kept is not None
         session = Session("s", SETTINGS, 0.0, named=True, epoch=EPOCH)
         _, owed = restore_session(session, kept, spoken)
-        session.journal.writer = JournalWriter("s", self.journal, saved=kept)
+        session.journal.open(self.journal)
+        session.journal.resume(kept)
         self.torn = Run(
             session, {effect.id: effect for effect in owed if isinstance(effect, Speak)}, self._now
         )

@@ -13,7 +13,7 @@ from realizer.core.settings import Settings
 from realizer.protocol.wire import ClipPiece, pack_clip
 from realizer.server.journal import Journal, JournalError, SavedSession, journal_at
 from realizer.server.journal.replay import restore_checkpoint, restore_session
-from realizer.server.journal.session_journal import ENTRIES, LONG, JournalWriter
+from realizer.server.journal.session_journal import ENTRIES, LONG
 from realizer.server.session.connections import LAST
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
@@ -30,8 +30,8 @@ WAIT = '<bml id="b"><wait id="w" duration="0.5"/></bml>'
 
 def opened(journal: Journal | None) -> Session:
     session = Session("long", SETTINGS, 0.0, named=True, epoch=0.0)
-    session.journal.writer = JournalWriter("long", journal)
-    session.journal.writer.begin(0.0)
+    session.journal.open(journal)
+    session.journal.begin(0.0)
     session.connect(1, 0.0)
     return session
 

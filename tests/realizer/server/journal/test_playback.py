@@ -21,7 +21,6 @@ from realizer.server.journal import JournalError, playback
 from realizer.server.journal.entry import SavedSession
 from realizer.server.journal.playback import replay_recording
 from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
-from realizer.server.journal.session_journal import JournalWriter
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
@@ -39,10 +38,8 @@ SCENE = '{"type": "scene", "objects": {"cup": {"x": 0.2, "y": -0.1, "z": 0.5}}}'
 def recorded(folder: Path) -> tuple[Path, list[str]]:
     """A session that was played with a slow voice: its recording, and its feedback."""
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
-    session.journal.writer = JournalWriter(
-        "s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None))
-    )
-    session.journal.writer.begin(1e9)
+    session.journal.open(recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
+    session.journal.begin(1e9)
     session.connect(1, 100.0)
     coming = [
         (100.05, SCENE),
@@ -67,7 +64,7 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
             elif isinstance(effect, Send) and str(effect.data).startswith("<"):
                 feedback.append(str(effect.data))
     session.disconnect(1, now)
-    session.journal.writer.end()
+    session.journal.end()
     return next(folder.glob("*.jsonl")), feedback
 
 
@@ -95,8 +92,8 @@ def test_replay_recording_plays_what_was_planned_to_its_end(tmp_path: Path) -> N
 def test_replay_recording_ends_with_the_words_of_an_open_speech(tmp_path: Path) -> None:
     session = Session("s", SETTINGS, 100.0, named=True, epoch=1e9)
     record = RecordingFolder(tmp_path, recording_head(SETTINGS, None))
-    session.journal.writer = JournalWriter("s", recorder=record)
-    session.journal.writer.begin(1e9)
+    session.journal.open(recorder=record)
+    session.journal.begin(1e9)
     session.connect(1, 100.0)
     session.receive(1, '{"type": "speech", "id": "turn", "append": "One two three. Four"}', 100.1)
     for step in range(100):
@@ -189,10 +186,8 @@ def random_recording(
         late: draws how late it is woken; None: never.
     """
     session = Session("s", SETTINGS, OPENED, named=True, epoch=1e9)
-    session.journal.writer = JournalWriter(
-        "s", recorder=RecordingFolder(folder, recording_head(SETTINGS, None))
-    )
-    session.journal.writer.begin(1e9)
+    session.journal.open(recorder=RecordingFolder(folder, recording_head(SETTINGS, None)))
+    session.journal.begin(1e9)
     session.connect(1, OPENED)
     got: list[bytes] = []
     answers: list[tuple[float, Speak]] = []
@@ -216,7 +211,7 @@ def random_recording(
             elif isinstance(effect, Send) and isinstance(effect.data, bytes):
                 got.append(effect.data)
     session.disconnect(1, now)
-    session.journal.writer.end()
+    session.journal.end()
     return read_recording(folder), got
 
 

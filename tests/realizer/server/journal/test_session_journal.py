@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bml_schema.feedback import WarningFeedback
-from realizer.server.journal import SavedSession
+from realizer.core.settings import Settings
+from realizer.server.journal import Journal, SavedSession
 from realizer.server.journal.entry import Entry, JournalError, TakenOver
 from realizer.server.journal.recordings import RecordingFolder, read_recording
-from realizer.server.journal.session_journal import AGAIN, BYTES, ENTRIES, JournalWriter
+from realizer.server.journal.session_journal import AGAIN, BYTES, ENTRIES, SessionJournal
 from realizer.server.journal.sqlite_journal import SqliteJournal
 from realizer.server.session.effects import Close
+from realizer.server.session.session import Session
 from tests.interleavings import Memory
 from tests.realizer.server.conftest import Driver
 
@@ -28,8 +31,8 @@ def test_session_sends_a_warning_without_seq_if_the_journal_is_full() -> None:
             super().add(session, entry)
 
     driver, journal = Driver(named=True), Full(":memory:")
-    driver.session.journal.writer = JournalWriter("test", journal)
-    driver.session.journal.writer.begin(0.0)
+    driver.session.journal.open(journal)
+    driver.session.journal.begin(0.0)
     client = driver.send({"type": "speech", "id": "turn", "append": "One. "})
     journal.full = True
     driver.send('<bml id="turn"><wait id="w"/></bml>')
@@ -51,9 +54,19 @@ def test_hand_over_closes_all_connections() -> None:
             raise TakenOver(session)
 
     driver = Driver(named=True)
-    driver.session.journal.writer = JournalWriter("test", Taken(":memory:"))
+    driver.session.journal.open(Taken(":memory:"))
     driver.join(2)
     assert driver.closed == [Close(k, 1012, "session test is another process's now") for k in (1, 2)]
+
+
+def opened(
+    journal: Journal | None = None, recorder: RecordingFolder | None = None, **options: Any
+) -> SessionJournal:
+    """Return the journal of a session in which nothing plays."""
+    session = Session("s", Settings(voice="silent"), 0.0, named=True)
+    session.journal.open(journal, recorder, **options)
+    session.journal.begin(0.0)
+    return session.journal
 
 
 class Full(RecordingFolder):
@@ -63,15 +76,14 @@ class Full(RecordingFolder):
         raise JournalError("no space left")
 
 
-def test_writer_stops_and_counts_a_recording_that_fails(
+def test_journal_stops_and_counts_a_recording_that_fails(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     journal, stopped = Memory(), []
-    notes = JournalWriter("s", journal, Full(tmp_path, {}), on_stopped=lambda: stopped.append(1))
-    notes.begin(0.0)
+    notes = opened(journal, Full(tmp_path, {}), on_stopped=lambda: stopped.append(1))
     with caplog.at_level(logging.WARNING):
         for at in (1.0, 2.0, 3.0):
-            notes.append(at, "text", 1, "<bml/>")
+            assert notes.accept(at, "text", 1, "<bml/>") is None
     assert [entry.at for entry in journal.entries["s"]] == [1.0, 2.0, 3.0]
     assert stopped == [1]
     assert [record.getMessage() for record in caplog.records] == [
@@ -79,27 +91,25 @@ def test_writer_stops_and_counts_a_recording_that_fails(
     ]
 
 
-def test_writer_calls_follow_as_long_as_it_returns_true() -> None:
+def test_journal_calls_follow_as_long_as_it_returns_true() -> None:
     answers = iter([True, True, False])
-    writer = JournalWriter("s", Memory(), follow=lambda: next(answers))
-    writer.begin(0.0)
+    writer = opened(Memory(), follow=lambda: next(answers))
     for at in range(5):
-        writer.append(float(at), "tick", 0, "")
+        writer.note(float(at), "tick")
     assert list(answers) == []
 
 
-def test_writer_goes_on_if_a_recording_cannot_begin(tmp_path: Path) -> None:
+def test_journal_goes_on_if_a_recording_cannot_begin(tmp_path: Path) -> None:
     folder = tmp_path / "records"
     record = RecordingFolder(folder, {})
     folder.rmdir()
     stopped: list[int] = []
-    notes = JournalWriter("s", Memory(), record, on_stopped=lambda: stopped.append(1))
-    notes.begin(0.0)
-    notes.append(1.0, "join", 1)
+    notes = opened(Memory(), record, on_stopped=lambda: stopped.append(1))
+    notes.note(1.0, "join", 1)
     assert stopped == [1]
 
 
-def test_writer_goes_on_if_a_recording_cannot_be_resumed(
+def test_journal_goes_on_if_a_recording_cannot_be_resumed(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder = tmp_path / "records"
@@ -107,78 +117,75 @@ def test_writer_goes_on_if_a_recording_cannot_be_resumed(
     folder.rmdir()
     stopped: list[int] = []
     kept = SavedSession(0.0, [Entry(1.0, "join", 1)])
-    notes = JournalWriter("s", Memory(), record, on_stopped=lambda: stopped.append(1), saved=kept)
+    notes = opened(Memory(), record, on_stopped=lambda: stopped.append(1))
     with caplog.at_level(logging.WARNING):
         notes.resume(kept)
     assert stopped == [1]
     assert "s has stopped" in caplog.text
 
 
-def test_writer_records_all_events_although_the_journal_is_full(tmp_path: Path) -> None:
+def test_journal_records_all_events_although_the_journal_is_full(tmp_path: Path) -> None:
     full = False
-    notes = JournalWriter("s", Memory(lambda: full), RecordingFolder(tmp_path, {}))
-    notes.begin(0.0)
-    notes.append(1.0, "join", 1)
+    notes = opened(Memory(lambda: full), RecordingFolder(tmp_path, {}))
+    notes.note(1.0, "join", 1)
     full = True
-    with pytest.raises(JournalError):
-        notes.append(2.0, "text", 1, "which is not taken")
-    notes.try_append(3.0, "tick")
+    assert "could not be written" in str(notes.accept(2.0, "text", 1, "which is not taken"))
+    notes.note(3.0, "tick")
     notes.end()
     (path,) = tmp_path.iterdir()
     assert read_recording(path).entries == [Entry(1.0, "join", 1), Entry(3.0, "tick")]
 
 
-def test_writer_needs_a_checkpoint_after_many_entries_or_bytes() -> None:
-    def notes(kept: list[Entry]) -> JournalWriter:
-        made = JournalWriter("s", Memory(), saved=SavedSession(0.0, kept))
-        made.begin(0.0)
+def test_journal_needs_a_checkpoint_after_many_entries_or_bytes() -> None:
+    def notes(kept: list[Entry]) -> SessionJournal:
+        made = opened(Memory())
+        made.resume(SavedSession(0.0, kept))
         return made
 
     many = notes([Entry(1.0, "tick")] * (ENTRIES - 1))
     assert not many.needs_checkpoint
-    many.try_append(2.0, "tick")
+    many.note(2.0, "tick")
     assert many.needs_checkpoint
-    assert many.compact({"state": ""})
+    assert many.compact(3.0)
     assert not many.needs_checkpoint
     large = notes([Entry(1.0, "sound", 1, bytes(BYTES - 1))])
     assert not large.needs_checkpoint
-    large.append(2.0, "text", 1, "x")
+    large.accept(2.0, "text", 1, "x")
     assert large.needs_checkpoint
 
 
-def test_writer_makes_up_for_lost_entries_by_a_checkpoint() -> None:
+def test_journal_makes_up_for_lost_entries_by_a_checkpoint() -> None:
     full = True
     journal = Memory(lambda: full)
-    notes = JournalWriter("s", journal)
-    notes.begin(0.0)
-    notes.try_append(1.0, "tick")
+    notes = opened(journal)
+    notes.note(1.0, "tick")
     assert notes.needs_checkpoint
-    assert not notes.compact({"state": "x"})
+    notes.compact(1.0)
     assert not notes.needs_checkpoint
     full = False
     for _ in range(AGAIN):
-        notes.try_append(2.0, "tick")
+        notes.note(2.0, "tick")
     assert notes.needs_checkpoint
-    assert notes.compact({"state": "x"})
-    assert journal.claim("s") == SavedSession(1.7e9, [], {"state": "x"})
+    notes.compact(2.0)
+    saved = journal.claim("s")
+    assert saved is not None
+    assert (saved.entries, list(saved.parts)) == ([], ["state"])
 
 
-def test_writer_warns_now_and_then_of_a_journal_that_only_grows(
+def test_journal_warns_now_and_then_of_a_journal_that_only_grows(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr("realizer.server.journal.session_journal.ENDLESS", 10)
-    notes = JournalWriter("s", Memory())
-    notes.begin(0.0)
+    notes = opened(Memory())
     with caplog.at_level(logging.WARNING):
         for _ in range(25):
-            notes.try_append(1.0, "tick")
+            notes.note(1.0, "tick")
     assert [record.args for record in caplog.records] == [("s", 10), ("s", 20)]
 
 
-def test_writer_never_compacts_a_session_that_is_only_recorded(tmp_path: Path) -> None:
-    notes = JournalWriter("s", recorder=RecordingFolder(tmp_path, {}))
-    notes.begin(0.0)
+def test_journal_never_compacts_a_session_that_is_only_recorded(tmp_path: Path) -> None:
+    notes = opened(None, RecordingFolder(tmp_path, {}))
     for _ in range(2 * ENTRIES):
-        notes.try_append(1.0, "tick")
+        notes.note(1.0, "tick")
     assert not notes.needs_checkpoint
     notes.end()

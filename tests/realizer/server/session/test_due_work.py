@@ -7,6 +7,7 @@ import math
 import pytest
 
 from realizer.server.session.due_work import STANDSTILL, SessionClock
+from tests.interleavings import Memory
 from tests.realizer.server.conftest import NOD, Driver
 
 CALM = """<bml id="{id}" composition="REPLACE"><head id="n" lexeme="NOD" start="0.3"/>
@@ -110,12 +111,14 @@ def test_session_plans_nothing_before_what_has_happened() -> None:
 
 
 def test_session_whose_host_goes_back_writes_a_journal_that_rises(tmp_path) -> None:
-    driver, times = Driver(), list[float]()
-    driver.session.journal.writer.append = lambda at, *entry: times.append(at)  # type: ignore[method-assign]
+    driver, journal = Driver(), Memory()
+    driver.session.journal.open(journal)
+    driver.session.journal.begin(0.0)
     for now in (3.0, 1.0, 0.0, 4.0):
         driver.session.receive(1, NOD.format(f"b{now:g}"), driver.opened + now)
         driver.session.tick(driver.opened + now)
         driver.session.connect(int(now) + 10, driver.opened + now - 0.5)
         driver.session.disconnect(int(now) + 10, driver.opened + now - 0.5)
+    times = [entry.at for entry in journal.entries["test"]]
     assert len(times) > 8
     assert times == sorted(times)
