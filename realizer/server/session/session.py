@@ -127,9 +127,8 @@ class Session:
         if self.closed:  # it ended while the client waited for it
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
-        self.connections[connection] = Connection(
-            connection, may_edit=may_edit and self.settings.edit is not None
-        )
+        may_edit = may_edit and self.settings.edit is not None
+        self.connections[connection] = Connection(connection, may_edit=may_edit)
         if not self.journal.note(self.clock.read(now), "join", connection):
             return
         self.empty_since = None
