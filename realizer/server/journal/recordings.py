@@ -6,12 +6,14 @@ import json
 import os
 import time
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from io import FileIO
 from pathlib import Path
 from typing import Any
 
 from realizer.behaviours.kind import Position
 from realizer.core.atomic_files import lock
+from realizer.core.options import PlayOptions
 from realizer.core.settings import Settings
 from realizer.server.journal.entry import Entry, JournalError, SavedSession, check_time, quoted
 
@@ -145,10 +147,8 @@ def _write(file: FileIO, line: str) -> None:
 
 # Settings that change what a session shows, or which messages it accepts.
 RECORDED_SETTINGS = (
-    *("face", "deformer", "voice", "language", "fps", "seed", "idle", "liveliness", "prosody"),
-    *("jaw", "lips", "cooccurrence"),
-    *("mapping", "media", "expressions", "strict_bml", "grace", "max_planning"),
-    *("max_document", "max_elements", "max_behaviours", "max_duration", "max_blocks", "max_speech"),
+    *(option.name for option in fields(PlayOptions) if option.name != "scene"),
+    *("voice", "max_document", "max_elements", "max_behaviours", "max_duration", "max_blocks", "max_speech"),
 )
 
 

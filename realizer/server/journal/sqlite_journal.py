@@ -110,19 +110,16 @@ class SqliteJournal:
 
     def end(self, session: str) -> None:
         with contextlib.suppress(JournalError), self._transaction():
-            if self._owns(session):
-                self._forget(session)
+            self._check_owner(session)
+            self._forget(session)
 
     def close(self) -> None:
         with contextlib.suppress(sqlite3.Error):
             self._file.close()
 
-    def _owns(self, session: str) -> bool:
-        query = "SELECT 1 FROM sessions WHERE id = ? AND owner = ?"
-        return self._file.execute(query, (session, self._owner)).fetchone() is not None
-
     def _check_owner(self, session: str) -> None:
-        if not self._owns(session):
+        query = "SELECT 1 FROM sessions WHERE id = ? AND owner = ?"
+        if self._file.execute(query, (session, self._owner)).fetchone() is None:
             raise TakenOver(session)
 
     def _set_part(self, session: str, name: str, text: str | None) -> None:

@@ -16,6 +16,7 @@ import socket
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
+from typing import Any
 from urllib.parse import parse_qs
 
 from realizer.core.errors import RealizerError
@@ -23,6 +24,7 @@ from realizer.core.logs import write_words
 from realizer.core.settings import Settings
 from realizer.server.runtime.session_registry import worker_of
 from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_workers
+from realizer.server.transports.transport import TRANSPORTS
 
 log = logging.getLogger(__name__)
 
@@ -242,7 +244,7 @@ def _work(
     write_words(level, f"worker {number}: ")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the parent, which ends the workers
     if number:  # other transports than the WebSocket are open in the first worker only
-        settings = replace(settings, asap_ports=None, xface_port=None, xface_player=None, stomp=None)
-        settings = replace(settings, vmc=None, livelink=None)
+        off: dict[str, Any] = {name: None for name in TRANSPORTS if hasattr(settings, name)}
+        settings = replace(settings, **off)
     control.setblocking(False)
     serve(replace(settings, port=port), number, control)
