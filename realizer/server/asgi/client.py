@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.server.transports.websocket.connection import GOODBYE, REASON
-from realizer.server.transports.websocket.protocol import UNIT, RateLimiter
+from realizer.server.transports.websocket.protocol import GOODBYE, REASON, UNIT, RateLimiter
 
 
 class AsgiClient:

@@ -1,19 +1,24 @@
-"""The WebSocket protocol of the service: it answers requests that are no GET, and limits what it reads."""
+"""WebSockets by the websockets library: requests that are no GET, limits of what is read, and clients."""
 
 import asyncio
+import contextlib
 from collections import Counter
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping
+from functools import lru_cache
 from typing import Any
 
 from websockets.asyncio.server import Server, ServerConnection
-from websockets.exceptions import InvalidMessage
-from websockets.frames import CTRL_OPCODES, Frame
+from websockets.exceptions import ConnectionClosed, InvalidMessage
+from websockets.frames import CTRL_OPCODES, Frame, Opcode
 from websockets.http11 import Response
 from websockets.protocol import Event, State
 from websockets.server import ServerProtocol
 
 from realizer.core.settings import limit_hint
+from realizer.server.http.requests import address_of, headers_of
 
+GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
+REASON = 123  # bytes of a reason in a close frame
 LONGEST_METHOD = 8  # characters, with the blank after it
 POST = (
     "there is nothing to POST to: send BML through the WebSocket at /ws, or run uvicorn realizer.asgi:app\n"
@@ -186,3 +191,68 @@ class Connection(ServerConnection):
         self._unread = b""
         if self._next is not None:
             self._next.cancel()
+
+
+class WebSocketClient:
+    """A `ClientSocket` of the websockets library: data goes directly to the socket's own buffer."""
+
+    def __init__(self, socket: ServerConnection) -> None:
+        self._socket = socket
+        self._end: asyncio.Task[None] | None = None
+        self.address, request = address_of(socket), socket.request
+        assert request is not None
+        self.target = request.path
+        self.headers: Mapping[str, str] = headers_of(request)
+
+    @property
+    def close_code(self) -> int | None:
+        return self._socket.close_code
+
+    def on_rate(self, warn: Callable[[str], None]) -> None:
+        if isinstance(self._socket, Connection):
+            self._socket.warn = warn
+
+    async def receive(self) -> str | bytes | None:
+        try:
+            return await self._socket.recv()
+        except ConnectionClosed:
+            return None
+
+    async def send_all(self, text: str | bytes) -> None:
+        with contextlib.suppress(ConnectionClosed):
+            await self._socket.send(text)
+
+    @property
+    def unsent_bytes(self) -> int:
+        transport = self._socket.transport
+        return 0 if transport is None else transport.get_write_buffer_size()
+
+    def send(self, data: str | bytes) -> None:
+        # Past the library's `send`, which needs a task for each message.
+        if self._end is None and self._socket.protocol.state is State.OPEN:
+            text = isinstance(data, str)
+            payload = data.encode() if isinstance(data, str) else data
+            self._socket.transport.write(_head(text, len(payload)) + payload)
+
+    def disconnect(self, code: int, reason: str) -> None:
+        if self._end is None:
+            self._end = asyncio.get_running_loop().create_task(self.close(code, reason))
+
+    async def close(self, code: int, reason: str) -> None:
+        """Close the WebSocket and wait until it is closed. A client that does not read is disconnected.
+
+        Args:
+            reason: is cut to what a close frame has room for.
+        """
+        reason = reason.encode()[:REASON].decode(errors="ignore")
+        try:
+            async with asyncio.timeout(GOODBYE):
+                await self._socket.close(code, reason)
+        except TimeoutError:
+            self._socket.transport.abort()
+
+
+@lru_cache(maxsize=1024)
+def _head(text: bool, length: int) -> bytes:
+    frame = Frame(Opcode.TEXT if text else Opcode.BINARY, bytes(length)).serialize(mask=False)
+    return frame[: len(frame) - length]

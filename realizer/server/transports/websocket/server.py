@@ -26,8 +26,8 @@ from realizer.server.http.requests import (
 )
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.transports.websocket.connection import GOODBYE, WebSocketConnections
-from realizer.server.transports.websocket.protocol import Connection, Protocol
+from realizer.server.transports.websocket.connection import WebSocketConnections
+from realizer.server.transports.websocket.protocol import GOODBYE, Connection, Protocol
 
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 OPENING = 10.0  # s; time for the HTTP request

@@ -5,16 +5,19 @@ from __future__ import annotations
 import asyncio
 import json
 import re
+from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from websockets.asyncio.client import connect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
 
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from realizer.server.transports.websocket.protocol import SLICE
+from realizer.server.transports.websocket.protocol import SLICE, WebSocketClient
 
 LIMIT = 60  # s; a hung test ends
 
@@ -168,3 +171,88 @@ def test_protocol_counts_errors_of_requests() -> None:
         assert "realizer_http_failures_total 0\n" in text
 
     asyncio.run(run())
+
+
+def between(test: Callable[[WebSocketClient, ClientConnection], Awaitable[None]]) -> None:
+    """Run a test with both ends of a connection."""
+
+    async def run() -> None:
+        ours: asyncio.Future[ServerConnection] = asyncio.get_running_loop().create_future()
+
+        async def handle(connection: ServerConnection) -> None:
+            ours.set_result(connection)
+            await connection.wait_closed()
+
+        async with asyncio.timeout(LIMIT), serve(handle, "127.0.0.1", 0, compression=None) as server:
+            port = server.sockets[0].getsockname()[1]
+            async with connect(f"ws://127.0.0.1:{port}", max_size=None, max_queue=None) as theirs:
+                await test(WebSocketClient(await ours), theirs)
+
+    asyncio.run(run())
+
+
+def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
+    sent: list[str | bytes] = []
+    for length in (0, 1, 125, 126, 127, 65_535, 65_536, 200_000):
+        sent += [
+            "é" * (length // 2) + "x" * (length % 2),
+            bytes(range(256)) * (length // 256) + bytes(length % 256),
+        ]
+
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        for message in sent:
+            client.send(message)
+        assert [await theirs.recv() for _ in sent] == sent
+
+    between(test)
+
+
+def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        client.send("one")
+        assert await asyncio.wait_for(await theirs.ping(), LIMIT) >= 0
+        client.send(b"two")
+        assert [await theirs.recv(), await theirs.recv()] == ["one", b"two"]
+
+    between(test)
+
+
+def test_writer_sends_nothing_after_the_end() -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        client.send("last")
+        client.disconnect(1013, "enough")
+        client.send("too late")
+        client.disconnect(1011, "a second end")
+        assert await theirs.recv() == "last"
+        with pytest.raises(ConnectionClosed) as closed:
+            await theirs.recv()
+        assert closed.value.rcvd is not None
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1013, "enough")
+        client.send("to nobody")
+        assert client.unsent_bytes == 0
+
+    between(test)
+
+
+def test_writer_counts_what_is_not_read() -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        theirs.transport.pause_reading()
+        while client.unsent_bytes < 100_000:
+            client.send(bytes(1_000_000))
+            await asyncio.sleep(0)
+        theirs.transport.resume_reading()
+        while client.unsent_bytes:
+            assert len(await theirs.recv()) == 1_000_000
+
+    between(test)
+
+
+def test_writer_cuts_a_long_reason() -> None:
+    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+        client.disconnect(1013, "é" * 100)  # two bytes each, and room for 123
+        with pytest.raises(ConnectionClosed) as closed:
+            await theirs.recv()
+        assert closed.value.rcvd is not None
+        assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1013, "é" * 61)
+
+    between(test)
