@@ -20,7 +20,7 @@ from realizer.server.streams.frame_windows import (
     last_frame_at,
 )
 from realizer.server.streams.frames_ahead import AheadSubscription
-from realizer.server.streams.schedule_stream import ScheduleStream, schedule_message
+from realizer.server.streams.schedule_stream import ScheduleStream
 from realizer.server.streams.video_stream import VideoStream
 
 log = logging.getLogger(__name__)
@@ -74,10 +74,6 @@ class Overload:
             now: seconds on the session clock.
         """
         return newest if self.is_active else first_frame_at(now - OUTDATED, fps)
-
-
-# A slow client gets schedules again after this time.
-RETRY = 0.1  # s
 
 
 class Fanout:
@@ -243,7 +239,7 @@ class Broadcast:
 
     def send_due(self, now: float, effects: list[Effect], *, is_reading: bool = False) -> None:
         """Send all that is due to the subscribers of the last `set_subscribers`."""
-        self._send_schedules(now, effects)
+        self._schedules.send_due(self.schedule_subscribers, now, effects)
         for connection, s in self._audio_subscribers:
             for message, is_sound in s.messages(now):
                 if is_sound and connection.is_slow:
@@ -288,28 +284,5 @@ class Broadcast:
         """The time of the next packet, picture or schedule; infinity if there is none."""
         times = [s.next_due() for _, s in self._audio_subscribers]
         times.append(self.video.next(self._video_subscribers))
-        if self.schedule_subscribers:
-            changed = self._schedules.has_changes()
-            times += [s.retry_at for _, s in self.schedule_subscribers if s.needs_full_update or changed]
+        times.append(self._schedules.next_due(self.schedule_subscribers))
         return min(times)
-
-    # inside -------------------------------------------------------------------------------------
-
-    def _send_schedules(self, now: float, effects: list[Effect]) -> None:
-        """Send changed blocks to subscribers that know the rest, all blocks to the others."""
-        if not self.schedule_subscribers:
-            self._schedules.reset()
-            return
-        changes = self._schedules.changes()
-        for connection, s in self.schedule_subscribers:
-            changed = [text for character, text in changes if s.index in (None, character)]
-            if connection.is_slow:
-                # The full update that is sent later includes these changes.
-                s.needs_full_update |= bool(changed)
-                s.retry_at = now + RETRY
-            elif s.needs_full_update or changed:
-                whole = s.needs_full_update
-                blocks = self._schedules.all_blocks(s.index) if whole else ",".join(changed)
-                if whole:
-                    s.needs_full_update, s.retry_at = False, now
-                effects.append(Send(connection.id, schedule_message(now, blocks, s.name, whole=whole)))

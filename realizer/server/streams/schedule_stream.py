@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -12,9 +13,14 @@ from realizer.playback.block_states import State
 from realizer.playback.block_store import BlockStore
 from realizer.playback.references import references
 from realizer.scheduling.timing import Schedule
+from realizer.server.session.connections import Connection, ScheduleSubscription
+from realizer.server.session.effects import Effect, Send
 
 if TYPE_CHECKING:
     from realizer.charts.timeline import BlockChart
+
+# A slow client gets schedules again after this time.
+RETRY = 0.1  # s
 
 
 @dataclass(eq=False)
@@ -40,9 +46,32 @@ class ScheduleStream:
         self._store = store
         self._snapshots: dict[int, Snapshot] = {}
 
-    def reset(self) -> None:
-        """Forget all blocks, as there are no subscribers."""
-        self._snapshots.clear()
+    def send_due(
+        self, subscribers: list[tuple[Connection, ScheduleSubscription]], now: float, effects: list[Effect]
+    ) -> None:
+        """Send changed blocks to subscribers that know the rest, all blocks to the others."""
+        if not subscribers:
+            self._snapshots.clear()
+            return
+        changes = self.changes()
+        for connection, s in subscribers:
+            changed = [text for character, text in changes if s.index in (None, character)]
+            if connection.is_slow:
+                # The full update that is sent later includes these changes.
+                s.needs_full_update |= bool(changed)
+                s.retry_at = now + RETRY
+            elif s.needs_full_update or changed:
+                whole = s.needs_full_update
+                blocks = self.all_blocks(s.index) if whole else ",".join(changed)
+                if whole:
+                    s.needs_full_update, s.retry_at = False, now
+                effects.append(Send(connection.id, schedule_message(now, blocks, s.name, whole=whole)))
+
+    def next_due(self, subscribers: list[tuple[Connection, ScheduleSubscription]]) -> float:
+        """Return when `send_due` would send something; infinity for never."""
+        changed = bool(subscribers) and self.has_changes()
+        times = (s.retry_at for _, s in subscribers if s.needs_full_update or changed)
+        return min(times, default=math.inf)
 
     def has_changes(self) -> bool:
         """Whether `changes` would return something."""
