@@ -230,18 +230,13 @@ class SessionRunner:
             self._reading.add(session)
 
     def _wake(self, session: Session, when: float) -> None:
-        began = self._loop.time()
-        self._tick(session, when)
-        self._report_slow_step(began, "frames and feedback", session)
-
-    def _tick(self, session: Session, when: float) -> None:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
         self.metrics.late.pending.append(now - when)
         self._overload.note(now - when, now)
-        if self._calls.is_busy(session):
-            return  # it is woken again when its call has ended
-        self._calls.call(session, partial(self._send_due, session, now), FRAME_SLICES)
+        if not self._calls.is_busy(session):  # else it is woken again when its call has ended
+            self._calls.call(session, partial(self._send_due, session, now), FRAME_SLICES)
+        self._report_slow_step(now, "frames and feedback", session)
 
     def _send_due(self, session: Session, now: float) -> None:
         try:
