@@ -86,13 +86,13 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
 
 
 def read_documents(names: Iterable[str]) -> list[str | bytes]:
-    """Return every document: `-` is standard input, and a text that names no file is spoken."""
+    """Return every document: `-` is standard input, and a text without "<" that names no file is spoken."""
     from realizer.sources import document_of
 
     texts: list[str | bytes] = []
     for number, name in enumerate(names, 1):
         with opening(name), reporting(ValueError, f"{name!r}: "):
-            texts.append(read_file(name) if name == "-" else document_of(name, number).bml)
+            texts.append(document_of(read_file(name) if name == "-" else name, number).bml)
     return texts
 
 

@@ -46,6 +46,12 @@ def test_read_documents_reads_files_and_speaks_texts(tmp_path: Path) -> None:
         inputs.read_documents([str(tmp_path / "b.bml")])
 
 
+@pytest.mark.parametrize("command", ["realize", "schedule", "check", "explain"])
+def test_read_documents_speaks_a_text_on_standard_input(command: str) -> None:
+    done = run_command(command, "-", stdin="Hello there\n")
+    assert (done.returncode, "wanted" in done.stdout + done.stderr) == (0, False)
+
+
 @pytest.mark.parametrize(
     ("command", "status"),
     [

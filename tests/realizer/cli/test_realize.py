@@ -95,7 +95,7 @@ def test_schedule_as_bml_leaves_out_a_refused_block() -> None:
     assert "c" in done.stderr
 
 
-@pytest.mark.parametrize("text", ["", "<!-- later -->", 'title = "x"', "<bml/>", "<bml id='b'><oops"])
+@pytest.mark.parametrize("text", ["", "<!-- later -->", "<bml/>", "<bml id='b'><oops"])
 def test_realize_writes_nothing_if_no_block_was_accepted(tmp_path: Path, text: str) -> None:
     out = tmp_path / "x.png"
     out.write_bytes(b"of before")
