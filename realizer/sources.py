@@ -20,6 +20,7 @@ _PIECE = re.compile(
     r"\S(?:.{0,9998}(?:[.!?…](?=\s|\Z)|[。！？])|.{0,9999}(?=\s|\Z)|.{0,9999})",
     re.DOTALL,
 )
+NOTHING = BMLError("wanted <bml>, or a text to speak, got nothing", line=1)
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
 
 
@@ -51,7 +52,7 @@ def documents_of(source: Source | Iterable[Source]) -> list[Document]:
     """
     if isinstance(source, Source):
         return [document_of(source)]
-    if not isinstance(source, Iterable) or isinstance(source, (dict, set)):
+    if not isinstance(source, Iterable) or isinstance(source, (dict, set, bytearray, memoryview)):
         raise TypeError(f"source: wanted {WANTED}, got {_type(source)}")
     documents = [document_of(item, number) for number, item in enumerate(source, 1)]
     if not documents:
@@ -62,8 +63,8 @@ def documents_of(source: Source | Iterable[Source]) -> list[Document]:
 def first_error(documents: Sequence[Document], vocabulary: Vocabulary, *, strict_bml: bool) -> BMLError:
     """Return the error of documents of which none can be read; its text names the file."""
     parts = ((part, d) for d in documents for part in read(d.bml, vocabulary, strict_bml=strict_bml))
-    nothing = BMLError("wanted <bml>, or a text to speak, got nothing", line=1), documents[0]
-    error, document = next(((part, d) for part, d in parts if isinstance(part, BMLError)), nothing)
+    found = ((part, d) for part, d in parts if isinstance(part, BMLError))
+    error, document = next(found, (NOTHING, documents[0]))
     text = f"{error.text} (in {document.file})" if document.file else error.text
     return type(error)(text, line=error.line, path=error.path, block=error.block)
 

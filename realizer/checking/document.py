@@ -15,6 +15,7 @@ from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech, synthesize
 from realizer.scheduling.timing import Schedule, Warning
+from realizer.sources import NOTHING
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Utterance
 
@@ -44,7 +45,7 @@ def check_document(file: str, source: Source, text: bytes | str, player: Player)
         player: plays all blocks, so that blocks may refer to earlier ones.
     """
     voice = SilentVoice()
-    items = list(read(text, VOCABULARY, strict_bml=player.strict_bml))
+    items = list(read(text, VOCABULARY, strict_bml=player.strict_bml)) or [NOTHING]
     for item, whole in zip(items, without_faults(source, items, player.strict_bml), strict=True):
         if isinstance(item, Block):
             utterances = synthesize(player.speech_requests(item), voice)

@@ -37,6 +37,8 @@ def check(
         FileNotFoundError: there is no such file.
         TypeError: the source or an option has another type.
     """
+    if not isinstance(advice, bool):
+        raise TypeError(f"advice: wanted True or False, got {advice!r}")
     options = PlayOptions(scene=scene, media=media, expressions=expressions, strict_bml=strict_bml)
     found: list[Finding] = []
     for number, document in enumerate(documents_of(source), 1):

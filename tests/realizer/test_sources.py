@@ -87,9 +87,9 @@ def test_documents_of_a_missing_file_are_an_error(source: str | Path) -> None:
     assert error.value.filename == str(source) or error.value.filename == source
 
 
-@pytest.mark.parametrize("source", [None, 3, {"a": 1}, ["Hello", 3], object()])
+@pytest.mark.parametrize("source", [None, 3, {"a": 1}, ["Hello", 3], bytearray(b"Hello")])
 def test_documents_of_another_type_are_an_error(source: object) -> None:
-    with pytest.raises(TypeError, match=r"source: wanted BML, a text, bytes, a pathlib\.Path"):
+    with pytest.raises(TypeError, match=r"source: wanted BML, a text, .*, got (None|int|dict|byte)"):
         documents_of(source)  # type: ignore[arg-type]
 
 

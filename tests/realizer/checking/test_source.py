@@ -27,7 +27,7 @@ def test_check_names_the_document(tmp_path: Path) -> None:
     assert str(faults[1]).startswith(f"{tmp_path / 'x.bml'}:2:28: CANNOT_CREATE_BEHAVIOR b:f: line 2")
 
 
-@pytest.mark.parametrize("source", ["<bml/>", "<bml id='b'><oops"])
+@pytest.mark.parametrize("source", ["<bml/>", "<bml id='b'><oops", "", b" ", "<!-- nothing -->"])
 def test_check_finds_what_is_no_document(source: str) -> None:
     assert realizer.check(source)
 
@@ -45,3 +45,8 @@ def test_check_adds_advice_on_request() -> None:
 def test_check_reports_a_missing_file() -> None:
     with pytest.raises(FileNotFoundError):
         realizer.check("no.bml")
+
+
+def test_check_refuses_advice_that_is_no_flag() -> None:
+    with pytest.raises(TypeError, match="advice: wanted True or False, got 'no'"):
+        realizer.check(WRONG, advice="no")  # type: ignore[arg-type]
