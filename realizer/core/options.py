@@ -66,6 +66,9 @@ class PlayOptions:
         for name, most in (("liveliness", 1), ("jaw", 2), ("lips", 2)):
             if not 0.0 <= (value := getattr(self, name)) <= most:
                 raise ValueError(f"{name}: wanted a number 0..{most}, got {value}")
+        for name, least in (("grace", 0), ("max_planning", 1)):
+            if not least <= (value := getattr(self, name)) < math.inf:
+                raise ValueError(f"{name}: wanted a number of at least {least}, got {value}")
         if self.deformer not in (None, "mpeg4", "au"):
             raise ValueError(f"deformer: wanted mpeg4 or au, got {self.deformer!r}")
         for name, place in (self.scene or {}).items():

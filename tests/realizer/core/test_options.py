@@ -25,3 +25,10 @@ def test_play_options_refuse_numbers_out_of_range(name: str, most: int) -> None:
         with pytest.raises(ValueError, match=rf"{name}: wanted a number 0\.\.{most}, got {value}"):
             PlayOptions(**{name: value})
     assert getattr(PlayOptions(**{name: most}), name) == most
+
+
+@pytest.mark.parametrize(("name", "least"), [("grace", 0), ("max_planning", 1)])
+def test_play_options_refuse_limits_below_the_least(name: str, least: int) -> None:
+    with pytest.raises(ValueError, match=f"{name}: wanted a number of at least {least}, got {least - 1}"):
+        PlayOptions(**{name: least - 1})
+    assert getattr(PlayOptions(**{name: least}), name) == least
