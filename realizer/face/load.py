@@ -119,7 +119,13 @@ def input_names(
 
 
 def list_faces(directory: Path | str | None = None) -> tuple[FaceInfo, ...]:
-    """Return all faces that `load_face` can find, by name, except those with an unreadable face.toml."""
+    """Return all faces that `load_face` can find, by name, except those with an unreadable face.toml.
+
+    Raises:
+        FileNotFoundError: `directory` does not exist.
+    """
+    if directory is not None and not Path(directory).is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder of faces", str(directory))
     found = []
     for name, folder in face_folders(directory).items():
         try:

@@ -68,9 +68,11 @@ def word_list(language: str) -> WordList | None:
 
 @cache
 def words_of(path: Path) -> WordList:
-    """Return the list of a user's file; raises TableError: an unreadable file, or as `read_words`."""
+    """Return the list of a user's file; raises FileNotFoundError, and TableError as `read_words`."""
     try:
         return read_words(path.read_text("utf-8-sig"), str(path))
+    except FileNotFoundError:
+        raise
     except (OSError, UnicodeError) as error:
         raise TableError(f"{path}: wanted a list of words, {error}") from None
 

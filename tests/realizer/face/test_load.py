@@ -46,6 +46,11 @@ def test_list_faces_are_sound_and_have_a_licence(name: str) -> None:
     assert info.source
 
 
+def test_list_faces_reports_a_missing_directory(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such folder of faces"):
+        list_faces(tmp_path / "none")
+
+
 def test_load_face_default_has_a_name_of_its_own() -> None:
     assert check_face() == ()
     assert load_face("default") is load_face(load_face().name)

@@ -82,3 +82,8 @@ def test_words_of_names_a_file_that_is_not_text(tmp_path: Path) -> None:
 def test_words_of_takes_a_byte_order_mark(tmp_path: Path) -> None:
     (tmp_path / "marked.csv").write_text("\ufeff" + HEAD + "gut,praise,own\n", "utf-8")
     assert words_of(tmp_path / "marked.csv").categories(["gut"]) == ["praise"]
+
+
+def test_words_of_a_missing_file_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        words_of(tmp_path / "no.csv")
