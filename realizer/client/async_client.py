@@ -114,6 +114,7 @@ class Client:
 
         Raises:
             ClientError: the block was refused, or the connection ended.
+            TypeError: `bml` is no string.
         """
         block = await self.send_and_follow(bml)
         await self.wait_for(lambda: block.is_finished)

@@ -20,7 +20,10 @@ def connect(url: str, *, token: str | None = None) -> PendingConnection:
         OSError: nothing listens at the address.
         ClientError: the address is not of such a service, which may have another version of the protocol, or
             it refuses the token or the session.
+        TypeError: `url` is no string.
     """
+    if not isinstance(url, str):
+        raise TypeError(f"url: wanted a string such as ws://127.0.0.1:8765/ws, got {url!r}")
     return PendingConnection(url, token)
 
 

@@ -46,7 +46,9 @@ class ClientError(RealizerError):
 
 
 def is_blank(bml: str) -> bool:
-    """Return whether a text contains nothing that the service would answer."""
+    """Return whether a text contains nothing that the service would answer; TypeError: it is no text."""
+    if not isinstance(bml, str):
+        raise TypeError(f"bml: wanted a string, got {bml!r:.60}")
     return not _COMMENT.sub("", bml).strip()
 
 

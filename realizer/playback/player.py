@@ -60,6 +60,8 @@ class Player(BlockManager):
         veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
         animates: bool = True,
     ) -> None:
+        if not isinstance(options, PlayOptions):
+            raise TypeError(f"options: wanted PlayOptions, got {options!r}")
         super().__init__(kinds, veto)
         self._face_inputs = face_inputs
         self.context = PlanningContext(

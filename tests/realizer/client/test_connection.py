@@ -68,3 +68,8 @@ def test_connect_raises_os_error_where_nothing_listens() -> None:
         assert caught.value.__notes__ == [f"wanted a service at {url}; `realizer serve` starts one"]
 
     asyncio.run(run())
+
+
+def test_connect_refuses_what_is_no_address() -> None:
+    with pytest.raises(TypeError, match="url: wanted a string"):
+        connect(8765)  # type: ignore[arg-type]

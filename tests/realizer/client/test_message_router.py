@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
-from realizer.client.message_router import MAX_FRAMES, MEMORY, BlockWaiter, ClientError, Playout, Router
+from realizer.client.message_router import (
+    MAX_FRAMES,
+    MEMORY,
+    BlockWaiter,
+    ClientError,
+    Playout,
+    Router,
+    is_blank,
+)
 from realizer.protocol.streams import JSON_STREAMS, KINDS
 from realizer.protocol.wire import WireError, WireFrame, pack
 
@@ -208,3 +216,9 @@ def test_playout_without_ahead_passes_frames_on() -> None:
         frame = WireFrame(1, number, number / FPS, np.array([number], "<i4").tobytes())
         playout.receive(frame, ZERO + number / FPS + late)
         assert taken(playout, ZERO + number / FPS + late) == [(number, number)]
+
+
+@pytest.mark.parametrize("bml", [3, b"<bml/>", None])
+def test_is_blank_refuses_what_is_no_text(bml: object) -> None:
+    with pytest.raises(TypeError, match="bml: wanted a string, got"):
+        is_blank(bml)  # type: ignore[arg-type]

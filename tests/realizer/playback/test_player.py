@@ -26,6 +26,11 @@ def progress(feedback: list[Feedback]) -> list[tuple[str, float]]:
     return [(f.id, f.global_time) for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)]
 
 
+def test_player_refuses_options_of_another_type() -> None:
+    with pytest.raises(TypeError, match="options: wanted PlayOptions, got 3"):
+        Player(3)  # type: ignore[arg-type]
+
+
 def test_player_acknowledges_predicts_starts_and_ends_a_block() -> None:
     player = Player()
     submit(player, SMILE, now=5.0)
