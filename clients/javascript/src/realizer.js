@@ -9,6 +9,7 @@ const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
 const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
+const over = () => new RealizerError("the connection was closed");
 const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
 
 /**
@@ -98,12 +99,11 @@ export class Realizer {
     };
   }
 
-  /** Close the connection; pending promises are rejected. */
+  /** Close the connection; pending promises and those of later calls are rejected. */
   close() {
     this.#closed = true;
     this.socket?.close();
-    const over = new RealizerError("the connection was closed");
-    for (const { reject } of [...this.#asked, ...[...this.#awaited.values()].flat()]) reject(over);
+    for (const { reject } of [...this.#asked, ...[...this.#awaited.values()].flat()]) reject(over());
     this.#asked = [];
     this.#unsent = [];
     this.#awaited.clear();
@@ -122,7 +122,7 @@ export class Realizer {
   ask(message) {
     this.#post(message);
     if (!(message.type in ANSWERS)) return Promise.resolve(null);
-    const answer = new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
+    const answer = this.#closed ? Promise.reject(over()) : new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
     answer.catch(nothing);
     return answer;
   }
@@ -207,7 +207,7 @@ export class Realizer {
   /** Send a message as soon as the connection is open. */
   #later(message) {
     if (this.open) this.send(message);
-    else this.#unsent.push(message);
+    else if (!this.#closed) this.#unsent.push(message);
   }
 
   /**
@@ -257,6 +257,7 @@ export class Realizer {
   /** Wait for the end of a block that was sent. */
   ended(id) {
     const end = new Promise((resolve, reject) => {
+      if (this.#closed) return reject(over());
       this.#awaited.set(id, [...(this.#awaited.get(id) ?? []), { planned: false, resolve, reject }]);
     });
     end.catch(nothing);

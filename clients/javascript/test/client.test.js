@@ -29,6 +29,14 @@ test("connect rejects without a service", async () => {
   lost.close();
 });
 
+test("play, say and state reject after close", async () => {
+  const closed = new Realizer({ url });
+  await closed.connect();
+  closed.close();
+  const calls = [closed.play(NOD("late")), closed.say(tone(0.1), { rate: RATE }), closed.ask({ type: "state" })];
+  for (const call of calls) await assert.rejects(call, { code: "connection" });
+});
+
 test("Realizer needs an address outside of pages", () => {
   assert.throws(() => new Realizer(), /wanted the url/);
 });
