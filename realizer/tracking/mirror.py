@@ -48,7 +48,9 @@ class Mirror:
             with Image.open(io.BytesIO(jpeg), formats=("JPEG", "PNG", "WEBP")) as file:
                 picture = file.convert("RGB")
         except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
-            raise TrackingError(f"wanted a JPEG, PNG or WebP picture, got: {error}") from None
+            raise TrackingError(
+                f"wanted a JPEG, PNG or WebP picture, got {len(jpeg)} bytes of something else"
+            ) from error
         self._face = self._find(picture)
         if self._face is None:
             self._smooth = None
