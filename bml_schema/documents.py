@@ -70,7 +70,10 @@ def parse(
     Raises:
         BMLError: the text is not well-formed (BMLSyntaxError) or too big (BMLSizeError), its block has no
             usable id, or it is not one document.
+        TypeError: `text` is neither str nor bytes.
     """
+    if not isinstance(text, str | bytes):
+        raise TypeError(f"text: wanted str or bytes, got {type(text).__name__}")
     results = read(
         text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours, strict_bml=strict_bml
     )

@@ -184,7 +184,10 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
 
     Raises:
         BMLError: not well-formed, not feedback, or without a required attribute.
+        TypeError: `text` is no string.
     """
+    if not isinstance(text, str):
+        raise TypeError(f"text: wanted a string, got {type(text).__name__}")
     if "<!DOCTYPE" in text:
         raise BMLSyntaxError("wanted feedback without DTD and entities, got <!DOCTYPE")
     try:

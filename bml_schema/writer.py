@@ -24,7 +24,10 @@ def write(block: Block) -> str:
     Raises:
         ValueError: a node has values that XML or BML cannot represent: a control character, NaN, or a
             description or unknown child that is not well-formed.
+        TypeError: `block` is no Block.
     """
+    if not isinstance(block, Block):
+        raise TypeError(f"block: wanted a Block, got {type(block).__name__}")
     return Writer().block(block) + "\n"
 
 

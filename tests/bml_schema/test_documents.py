@@ -383,3 +383,9 @@ def test_read_a_page_of_html_says_what_came_instead_of_bml() -> None:
     (error,) = read("<!DOCTYPE html>\n<html><body>Hello</body></html>")
     assert isinstance(error, BMLError)
     assert error.text == 'wanted <bml>, got "<!DOCTYPE html>\n<html><body>Hello</body></html>"'
+
+
+@pytest.mark.parametrize("text", [None, 3, ["<bml id='b'/>"]])
+def test_parse_refuses_what_is_no_text(text: object) -> None:
+    with pytest.raises(TypeError, match="text: wanted str or bytes, got"):
+        parse(text)  # type: ignore[arg-type]

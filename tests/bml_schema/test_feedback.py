@@ -276,3 +276,8 @@ def test_block_progress_has_the_words_spoken_before_a_cut() -> None:
 def test_to_xml_writes_times_to_the_microsecond(time: float) -> None:
     message = BlockProgress(id="b:end", global_time=time).to_xml()
     assert f'globalTime="{decimal(round(float(time), 6))}"' in message
+
+
+def test_parse_feedback_refuses_bytes() -> None:
+    with pytest.raises(TypeError, match="text: wanted a string, got bytes"):
+        parse_feedback(b"<blockProgress/>")  # type: ignore[arg-type]

@@ -92,3 +92,9 @@ def test_write_keeps_a_description_inside_its_element(content: str) -> None:
 def test_write_refuses_unknown_children_without_a_namespace(other: str) -> None:
     with pytest.raises(ValueError, match="wanted one well-formed element in a namespace of its own"):
         write(Block(id="b", children=(Wait(id="w", unknown_children=(other,)),)))
+
+
+@pytest.mark.parametrize("block", [None, "<bml id='b'/>", Wait(id="w")])
+def test_write_refuses_what_is_no_block(block: object) -> None:
+    with pytest.raises(TypeError, match="block: wanted a Block, got"):
+        write(block)  # type: ignore[arg-type]
