@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from realizer.core.options import PlayOptions
@@ -32,3 +33,8 @@ def test_play_options_refuse_limits_below_the_least(name: str, least: int) -> No
     with pytest.raises(ValueError, match=f"{name}: wanted a number of at least {least}, got {least - 1}"):
         PlayOptions(**{name: least - 1})
     assert getattr(PlayOptions(**{name: least}), name) == least
+
+
+def test_play_options_take_numbers_of_numpy() -> None:
+    options = PlayOptions(seed=np.int64(3), fps=np.float32(30))  # type: ignore[arg-type]
+    assert (type(options.seed), type(options.fps)) == (int, float)
