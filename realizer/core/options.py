@@ -61,8 +61,8 @@ class PlayOptions:
             value = getattr(self, name)
             if not isinstance(value, types) or (isinstance(value, bool) and types is not bool):
                 raise TypeError(f"{name}: wanted {wanted}, got {value!r}")
-            if types in (Real, Integral):  # numbers of numpy overflow, and are not JSON
-                object.__setattr__(self, name, float(value) if types is Real else int(value))
+            if isinstance(value, Real) and types is not bool:  # those of numpy overflow, and are not JSON
+                object.__setattr__(self, name, int(value) if isinstance(value, Integral) else float(value))
         if not (math.isfinite(self.fps) and self.fps > 0):
             raise ValueError(f"fps: wanted a number above 0, got {self.fps}")
         for name, most in (("liveliness", 1), ("jaw", 2), ("lips", 2)):
