@@ -324,7 +324,7 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
         if found is None:
             raise
         root, note = found
-        notes = (note,)
+        notes = (note,) if note else ()
     return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
 
 

@@ -36,10 +36,10 @@ _INNER = {local(c.tag) for c in (Required, Constraint, Synchronize, Before, Afte
 def read_undeclared(
     data: bytes, vocabulary: Mapping[str, type[Behaviour]]
 ) -> tuple[etree._Element, str] | None:
-    """Return the root of a document without its undeclared prefixes, and how its names were read.
+    """Return the root of a document without its undeclared prefixes, and how its names were read, or "".
 
     A name with a well-known prefix is read in that prefix's namespace, any other as if it had no prefix. What
-    has no meaning either way is removed.
+    has no meaning either way is removed, except behaviours, which stay unknown.
 
     Args:
         data: the document in UTF-8 without prolog; not well-formed.
@@ -62,7 +62,6 @@ def read_undeclared(
     for element in list(root.iter()):
         prefix, colon, name = element.tag.rpartition(":")
         if colon and not prefix.startswith("{"):
-            prefixes[prefix] = None
             tag = next((t for t in _tags(prefix, name) if t in vocabulary or t == Block.tag), None)
             if tag is None and (prefix in _MEANT or element is root):
                 tag = f"{{{_MEANT[prefix]}}}{name}" if prefix in _MEANT else name
@@ -70,6 +69,10 @@ def read_undeclared(
                 name in _INNER or any(name in schema_of(c).by_local for c in vocabulary.values())
             ):
                 tag = name
+            if tag is None and local(element.getparent().tag) in ("bml", local(Required.tag)):
+                element.tag = name  # an unknown behaviour, of which its own warning says so
+                continue
+            prefixes[prefix] = None
             if tag is None:
                 removed[f"<{prefix}:{name}>"] = None
                 remove_element(element)
@@ -77,6 +80,8 @@ def read_undeclared(
             element.tag = tag
         if any(":" in key and key[0] != "{" for key in element.attrib):
             _rename_attributes(element, vocabulary.get(element.tag), prefixes, removed)
+    if not prefixes:
+        return root, ""
     note = f"prefixes without a declaration: {', '.join(prefixes)}; names with them are read as known names"
     return root, f"{note}, and without a meaning are {', '.join(removed)}" if removed else note
 

@@ -38,6 +38,13 @@ def test_undeclared_prefix_is_read_as_if_it_were_not_there(inside: str, wanted: 
     assert len(block.problems) == 1
 
 
+@pytest.mark.parametrize("inside", ['<q:wink id="w"/>', '<required><q:wink id="w"/></required>'])
+def test_undeclared_prefix_of_an_unknown_behaviour_drops_that(inside: str) -> None:
+    for head in ('<bml id="b">', f'<bml id="b" xmlns="{CORE}">'):
+        (problem,) = parse(f"{head}{inside}</bml>").problems
+        assert (problem.id, problem.type, problem.dropped) == ("b:w", "BEHAVIOR_TYPE_NOT_SUPPORTED", True)
+
+
 def test_undeclared_prefix_that_is_well_known_means_its_namespace() -> None:
     block = parse('<bml id="b" bmla:appendAfter="a"><bmla:interrupt id="i" target="A"/></bml>')
     assert block.append_after == ("a",)
