@@ -18,7 +18,7 @@ PREFIX = "REALIZER_"
 OTHERS = frozenset({"REALIZER_DRAW", "REALIZER_FACES", "REALIZER_HEAD_DATA", "REALIZER_NO_PAGE"})
 
 
-class SettingsError(RealizerError):
+class SettingsError(RealizerError, ValueError):
     """A setting has a wrong value; the message names it, the wanted values and the actual one.
 
     Attributes:

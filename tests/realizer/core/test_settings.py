@@ -26,6 +26,11 @@ def test_settings_prefer_flags_to_variables_to_the_file(tmp_path: Path) -> None:
     assert (settings.port, settings.fps, settings.face, settings.voice) == (3, 30.0, "x", None)
 
 
+def test_settings_raise_value_errors() -> None:
+    with pytest.raises(ValueError, match="setting port: wanted a whole number"):
+        Settings(port=-1)
+
+
 def test_settings_name_a_wrong_value() -> None:
     with pytest.raises(SettingsError, match=r"setting port: wanted a whole number 0..65535, got '70000'"):
         Settings.read(environment={"REALIZER_PORT": "70000"})
