@@ -14,6 +14,8 @@ from realizer.scheduling.rigid_clusters import least_squares
 
 # Active sets tried before the interior point method, which is rarely needed.
 GUESSES = 12
+# One that is wrong about so many inequalities after that many guesses rarely converges.
+WRONG, AFTER = 24, 4
 # Corrections of the active set after the interior point method; mostly one is enough.
 ROUNDS = 20
 # Up to this many unknowns a thread costs more time than it leaves to others.
@@ -68,12 +70,15 @@ def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
         return None
     binding = (x[v] - x[u] < w - TIGHT) & differ
     seen: list[bytes] = []
-    for _ in range(GUESSES):
+    for guess in range(1, GUESSES + 1):
         exact, force = _bound(quadratic, binding, x)
         broken = (exact[v] - exact[u] < w - TIGHT) & differ
         misplaced = broken | (force < -RESTS * quadratic.stiffness.max(initial=0.0))
-        if not misplaced.any():
+        wrong = np.count_nonzero(misplaced)
+        if not wrong:
             return exact
+        if guess == AFTER and wrong > WRONG:
+            return None
         binding = (binding & ~misplaced) | broken
         # The same guess may be worth a second try, because it starts from another x.
         seen.append(binding.tobytes())
