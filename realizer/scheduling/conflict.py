@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 from realizer.core import work
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Clause, Warning
 
 
-@dataclass(frozen=True, slots=True)
-class LengthBound:
+class LengthBound(NamedTuple):
     """The least length of a behaviour between two of its points, or the greatest if `most`."""
 
     part: Part
@@ -22,7 +23,7 @@ class LengthBound:
     most: bool = False
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Link:
     """One inequality of a cycle: time[v] >= time[u] + seconds; a bound (the earliest start) has u = ORIGIN.
 
@@ -35,7 +36,7 @@ class Link:
     order: Relation | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Conflict:
     """A minimal set of relations that cannot hold together."""
 
@@ -45,10 +46,27 @@ class Conflict:
     earliest: tuple[Part, str, float] | None = None
     named: tuple[Part, ...] = ()  # the behaviours of the points, also those that state none of the relations
 
-    @property
+    @cached_property
     def parts(self) -> list[Part]:
         """The parts that state the relations and gaps, each once."""
-        return _once([r.part for r in self.relations] + [g.part for g in self.gaps])
+        return list(dict.fromkeys([r.part for r in self.relations] + [g.part for g in self.gaps]))
+
+    @cached_property
+    def candidates(self) -> list[Part]:
+        """The parts of which one can be dropped, by kind; none if everything is required."""
+        optional = [part for part in self.parts if not part.required]
+        constraints = [part for part in optional if part.is_constraint]
+        return constraints or optional or [part for part in self.named if not part.required]
+
+    @cached_property
+    def clauses(self) -> list[tuple[Part, Clause]]:
+        """What the conflict consists of, in the order of its chain, and which part states it."""
+        texts = [(r.part, _relation(r)) for r in self.relations] + [(g.part, _gap(g)) for g in self.gaps]
+        found = [(part, Clause(part.id, part.line, text)) for part, text in texts]
+        if self.earliest is not None:
+            part, point, seconds = self.earliest
+            found.append((part, Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")))
+        return found
 
     @property
     def statements(self) -> int:
@@ -128,7 +146,7 @@ def _conflict(problem: Problem, relations: Sequence[Relation], links: Sequence[L
         gaps.pop()
     owners = [problem.behaviours[problem.owner[p]] for p in sorted(points) if p != ORIGIN]
     unique = {id(r): r for r in relations}
-    return Conflict(tuple(unique.values()), tuple(gaps), earliest, tuple(_once(owners)))
+    return Conflict(tuple(unique.values()), tuple(gaps), earliest, tuple(dict.fromkeys(owners)))
 
 
 def _joined(first: LengthBound, second: LengthBound) -> list[LengthBound]:
@@ -142,10 +160,6 @@ def _joined(first: LengthBound, second: LengthBound) -> list[LengthBound]:
     return [first, second]
 
 
-def _once(parts: Iterable[Part]) -> list[Part]:
-    return list({id(part): part for part in parts}.values())
-
-
 IMPOSSIBLE = "IMPOSSIBLE_TO_SCHEDULE"
 # In a sentence; `Warning.clash` has all.
 MAX_CLAUSES = 30
@@ -157,7 +171,7 @@ def choose(clash: Conflict) -> Part | None:
     Of equal ones it is the later in the document. A behaviour that is only referred to stays if another one
     states a relation or gap. Return None if everything is required.
     """
-    return max(_candidates(clash), key=lambda part: (-part.priority, part.order), default=None)
+    return max(clash.candidates, key=lambda part: (-part.priority, part.order), default=None)
 
 
 def warning_of(clash: Conflict, dropped: Part) -> Warning:
@@ -168,12 +182,12 @@ def warning_of(clash: Conflict, dropped: Part) -> Warning:
     else:
         reason = _reason(clash, dropped)
         text = f"{name} cannot be placed: {in_words(clash)}; {name} was dropped because {reason}"
-    return Warning(dropped.id, IMPOSSIBLE, text, clauses(clash), dropped.is_constraint)
+    return Warning(dropped.id, IMPOSSIBLE, text, _unique(clash), dropped.is_constraint)
 
 
 def refusal(block: str, clash: Conflict) -> Warning:
     text = f"{in_words(clash)}, and all of this is required"
-    return Warning(block, IMPOSSIBLE, text, clauses(clash))
+    return Warning(block, IMPOSSIBLE, text, _unique(clash))
 
 
 def fault_warning(part: Part, text: str) -> Warning:
@@ -185,34 +199,19 @@ def fault_warning(part: Part, text: str) -> Warning:
 
 def in_words(clash: Conflict) -> str:
     """Return the conflict as the clauses of one sentence, in the order of their chain."""
-    unique = list(dict.fromkeys(f"{c.text}{_placed(part, c.line)}" for part, c in _clauses(clash)))
+    unique = list(dict.fromkeys(f"{c.text}{_placed(part, c.line)}" for part, c in clash.clauses))
     quantity = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
     if len(unique) > MAX_CLAUSES:
         unique[MAX_CLAUSES - 1 :] = [f"{len(unique) - MAX_CLAUSES + 1} more such things"]
     return f"{_join(unique)} cannot {quantity}hold"
 
 
-def clauses(clash: Conflict) -> tuple[Clause, ...]:
-    return tuple(dict.fromkeys(clause for _, clause in _clauses(clash)))
-
-
-def _clauses(clash: Conflict) -> list[tuple[Part, Clause]]:
-    texts = [(r.part, _relation(r)) for r in clash.relations] + [(g.part, _gap(g)) for g in clash.gaps]
-    found = [(part, Clause(part.id, part.line, text)) for part, text in texts]
-    if clash.earliest is not None:
-        part, point, seconds = clash.earliest
-        found.append((part, Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")))
-    return found
-
-
-def _candidates(clash: Conflict) -> Collection[Part]:
-    optional = [part for part in clash.parts if not part.required]
-    constraints = [part for part in optional if part.is_constraint]
-    return constraints or optional or [part for part in clash.named if not part.required]
+def _unique(clash: Conflict) -> tuple[Clause, ...]:
+    return tuple(dict.fromkeys(clause for _, clause in clash.clauses))
 
 
 def _reason(clash: Conflict, dropped: Part) -> str:
-    others = [part for part in _candidates(clash) if part is not dropped]
+    others = [part for part in clash.candidates if part is not dropped]
     if not others:
         required = any(part.required for part in (*clash.parts, *clash.named))
         return "everything else in this is required" if required else "nothing else has a part in this"

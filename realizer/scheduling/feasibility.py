@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections import defaultdict, deque
+from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush
-from itertools import count
+from itertools import accumulate
 from math import inf
+from typing import TypeAlias
 
 from realizer.core import work
 from realizer.scheduling.conflict import Conflict, Link, choose, conflict_of
 from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import LOOSE, drop_least_gaps
-from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
+from realizer.scheduling.problem import ORIGIN, Part, Problem
 
+# The causes of times that follow from the point before and from the earliest start of a behaviour.
+_BEFORE, _EARLIEST = Link(ORIGIN, ORIGIN, 0.0), Link(ORIGIN, ORIGIN, 0.0)
 
-@dataclass(slots=True, eq=False)
-class Edge:
-    """An inequality, time[v] >= time[u] + seconds, and what states it."""
-
-    u: int
-    v: int
-    seconds: float
-    reason: Relation | Link
+Step: TypeAlias = tuple[int, int, float, Link]  # time[v] >= time[u] + seconds, and its cause
 
 
 class ConstraintNetwork:
@@ -35,69 +30,124 @@ class ConstraintNetwork:
     """
 
     def __init__(self, points: int) -> None:
-        self._level = [0.0, *[-inf] * (points - 1)]
-        self._cause: list[Edge | None] = [None] * points
-        self._out: list[dict[Edge, None]] = [{} for _ in range(points)]
-        self._in: list[dict[Edge, None]] = [{} for _ in range(points)]
+        self._level = [0.0, *[-inf] * points]
+        self._cause: list[Link | None] = [None] * (points + 1)
+        self._out, self._in = (
+            defaultdict[int, dict[Link, None]](dict),
+            defaultdict[int, dict[Link, None]](dict),
+        )
+        # The earliest time of each point, and the least seconds to the next one; -inf if there is none.
+        self._earliest, self._least = [-inf] * points, [-inf] * points
 
-    def add(self, edge: Edge) -> list[Edge]:
+    def add_chain(self, first: int, earliest: float, least: Sequence[float]) -> None:
+        """Add the inequalities of successive points that have none yet."""
+        self._earliest[first] = earliest
+        self._least[first : first + len(least)] = least
+        if earliest > -inf:
+            last = first + len(least)
+            self._level[first : last + 1] = accumulate(least, initial=earliest)
+            self._cause[first : last + 1] = [_EARLIEST, *[_BEFORE] * len(least)]
+
+    def add(self, link: Link) -> list[Link]:
         """Add an inequality, or return the cycle of inequalities with which it cannot hold."""
-        level, cause, order = self._level, self._cause, count()
-        before: dict[int, tuple[float, Edge | None]] = {}
-        # The point that rises most comes first; so each rises once, as in Dijkstra's algorithm.
-        queue = [(0.0, next(order), edge)]
-        while queue:
-            work.count()
-            _, _, step = heappop(queue)
-            v, time = step.v, level[step.u] + step.seconds
-            if time <= level[v] + LOOSE:
-                continue
-            if v == ORIGIN or v == edge.u:
-                cycle = self._cycle(step)
-                for point, (old, reason) in before.items():
-                    level[point], cause[point] = old, reason
-                return cycle
-            work.count(2 + len(self._out[v]) // 2)
-            before.setdefault(v, (level[v], cause[v]))
-            level[v], cause[v] = time, step
-            for following in self._out[v]:
-                rise = time + following.seconds - level[following.v]
-                if rise > LOOSE:
-                    heappush(queue, (-rise, next(order), following))
-        self._out[edge.u][edge] = self._in[edge.v][edge] = None
+        if self._level[link.u] + link.seconds > self._level[link.v] + LOOSE and (cycle := self._raise(link)):
+            return cycle
+        self._out[link.u][link] = self._in[link.v][link] = None
         return []
 
-    def remove(self, edges: Iterable[Edge]) -> None:
-        """Remove inequalities that are there, and lower the times that followed from them."""
+    def _raise(self, link: Link) -> list[Link]:
+        """Raise times so that an inequality holds; or leave them, and return a cycle."""
+        level, cause, least, order, steps = self._level, self._cause, self._least, 0, 0
+        before: dict[int, tuple[float, Link | None]] = {}
+        # The point that rises most comes first; so each rises once, as in Dijkstra's algorithm.
+        queue: list[tuple[float, int, Step]] = [(0.0, 0, (link.u, link.v, link.seconds, link))]
+        while queue:
+            steps += 1
+            step = heappop(queue)[2]
+            u, v, seconds, reason = step
+            time = level[u] + seconds
+            if time <= level[v] + LOOSE:
+                continue
+            if v in (ORIGIN, link.u):
+                cycle = self._cycle(step)
+                for point, (old, earlier) in before.items():
+                    level[point], cause[point] = old, earlier
+                return cycle
+            work.count(2 + steps)
+            steps = 0
+            before.setdefault(v, (level[v], cause[v]))
+            level[v], cause[v] = time, reason
+            if (rise := time + least[v] - level[v + 1]) > LOOSE:
+                order += 1
+                heappush(queue, (-rise, order, (v, v + 1, least[v], _BEFORE)))
+            for following in self._out.get(v, ()):
+                rise = time + following.seconds - level[following.v]
+                if rise > LOOSE:
+                    order += 1
+                    heappush(queue, (-rise, order, (v, following.v, following.seconds, following)))
+        return []
+
+    def remove(self, links: Iterable[Link], unused: range = range(0)) -> None:
+        """Remove inequalities that are there, and lower the times that followed from them.
+
+        Times of `unused` points, which will be isolated, need not be right.
+        """
         lowered = []
-        for edge in edges:
-            if edge in self._out[edge.u]:
-                del self._out[edge.u][edge], self._in[edge.v][edge]
-                if self._cause[edge.v] is edge:
-                    lowered.append(edge.v)
+        for link in links:
+            if link in self._out[link.u]:
+                del self._out[link.u][link], self._in[link.v][link]
+                if self._cause[link.v] is link:
+                    lowered.append(link.v)
         for point in lowered:
             work.count()
             self._level[point], self._cause[point] = -inf, None
-            lowered += [step.v for step in self._out[point] if self._cause[step.v] is step]
-        queue = deque(step for point in dict.fromkeys(lowered) for step in self._in[point])
+            lowered += [v for _, v, _, reason in self._steps_from(point) if self._cause[v] is reason]
+        if all(point in unused for point in lowered):
+            return
+        queue = deque(step for point in dict.fromkeys(lowered) for step in self._steps_to(point))
         while queue:
             work.count()
-            step = queue.popleft()
-            time = self._level[step.u] + step.seconds
-            if time > self._level[step.v] + LOOSE:
-                self._level[step.v], self._cause[step.v] = time, step
-                queue.extend(self._out[step.v])
+            u, v, seconds, reason = queue.popleft()
+            time = self._level[u] + seconds
+            if time > self._level[v] + LOOSE:
+                self._level[v], self._cause[v] = time, reason
+                queue.extend(self._steps_from(v))
 
-    def edges_of(self, points: Iterable[int]) -> list[Edge]:
-        return list(dict.fromkeys(edge for p in points for edge in (*self._out[p], *self._in[p])))
+    def isolate(self, points: range) -> None:
+        """Remove all inequalities of successive points of which the others have no chain."""
+        for p in points:
+            self._level[p] = self._earliest[p] = self._least[p] = -inf
+            self._cause[p] = None
+        self.remove(
+            dict.fromkeys(link for p in points for link in (*self._out.get(p, ()), *self._in.get(p, ())))
+        )
 
-    def _cycle(self, last: Edge) -> list[Edge]:
-        """Return the cycle that an inequality closes with those from which the time of its tail follows."""
-        chain, place = [last], {last.v: 0}
+    def _steps_from(self, point: int) -> list[Step]:
+        steps = [(point, link.v, link.seconds, link) for link in self._out.get(point, ())]
+        if self._least[point] > -inf:
+            steps.insert(0, (point, point + 1, self._least[point], _BEFORE))
+        return steps
+
+    def _steps_to(self, point: int) -> list[Step]:
+        steps = [(link.u, point, link.seconds, link) for link in self._in.get(point, ())]
+        if self._earliest[point] > -inf:
+            steps.insert(0, (ORIGIN, point, self._earliest[point], _EARLIEST))
+        elif self._least[point - 1] > -inf:
+            steps.insert(0, (point - 1, point, self._least[point - 1], _BEFORE))
+        return steps
+
+    def _cycle(self, last: Step) -> list[Link]:
+        """Return the cycle that a step closes with those from which the time of its tail follows."""
+        u, v, seconds, reason = last
+        chain, place = [Link(u, v, seconds) if reason is _BEFORE else reason], {v: 0}
         while (point := chain[-1].u) not in place:
             place[point] = len(chain)
             before = self._cause[point]
             assert before is not None, "all times follow from point 0"
+            if before is _BEFORE:
+                before = Link(point - 1, point, self._least[point - 1])
+            elif before is _EARLIEST:
+                before = Link(ORIGIN, point, self._earliest[point])
             chain.append(before)
         # While times rise, those at the other end of the chain may form a cycle already.
         return chain[place[point] :][::-1]
@@ -110,11 +160,10 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     the part that `choose` drops is removed with all that refers to it. If it drops nothing, the search ends.
     """
     network = ConstraintNetwork(len(problem.owner))
-    for edge in _lengths(problem):
-        network.add(edge)
+    _add_lengths(network, problem)
     number = {id(part): n for n, part in enumerate(problem.behaviours)}
     relations = [(r, True) for r in problem.equalities] + [(r, False) for r in problem.orders]
-    edges: dict[int, list[Edge]] = {id(r.part): [] for r, _ in relations}
+    links: dict[int, list[Link]] = {id(r.part): [] for r, _ in relations}
     constraints: dict[str, list[Part]] = {}  # that name a behaviour
     for part in {id(r.part): r.part for r, _ in relations if r.part.is_constraint}.values():
         for name in part.names:
@@ -125,29 +174,31 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
 
     def drop(part: Part) -> None:
         gone.add(id(part))
-        network.remove(edges.get(id(part), ()))
-        if (n := number.get(id(part))) is not None:
-            absent.add(n)
-            first = problem.first[n]
-            network.remove(network.edges_of(range(first, first + len(problem.timings[n].points))))
-            for constraint in constraints.get(part.id, ()):
-                gone.add(id(constraint))
-                network.remove(edges[id(constraint)])
+        if (n := number.get(id(part))) is None:
+            network.remove(links[id(part)])
+            return
+        absent.add(n)
+        points = range(problem.first[n], problem.first[n] + len(problem.timings[n].points))
+        network.remove(links.get(id(part), ()), points)
+        network.isolate(points)
+        for constraint in constraints.get(part.id, ()):
+            gone.add(id(constraint))
+            network.remove(links[id(constraint)])
 
     for relation, is_equality in work.counted(relations, 2):
         u, v, seconds, part, _ = relation
-        reason = relation if is_equality else Link(u, v, seconds, relation)
-        if is_equality:  # time[u] = time[v] + seconds
-            inequalities = [Edge(v, u, seconds, reason), Edge(u, v, -seconds, reason)]
-        else:
-            inequalities = [Edge(u, v, seconds, reason)]
-        for edge in inequalities:
+        # An equality is time[u] = time[v] + seconds.
+        for link in (
+            (Link(v, u, seconds, relation), Link(u, v, -seconds, relation))
+            if is_equality
+            else (Link(u, v, seconds, relation),)
+        ):
             while id(part) not in gone and absent.isdisjoint((problem.owner[u], problem.owner[v])):
-                cycle = network.add(edge)
+                cycle = network.add(link)
                 if not cycle:
-                    edges[id(part)].append(edge)
+                    links[id(part)].append(link)
                     break
-                conflict = conflict_of(problem, (step.reason for step in cycle))
+                conflict = conflict_of(problem, cycle)
                 conflicts.append(conflict)
                 dropped = choose(conflict)
                 if dropped is None:
@@ -156,24 +207,23 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     return conflicts
 
 
-def _lengths(problem: Problem) -> Iterator[Edge]:
-    """Return the inequalities that behaviours state by themselves: their lengths and earliest starts."""
+def _add_lengths(network: ConstraintNetwork, problem: Problem) -> None:
+    """Add the inequalities that behaviours state by themselves: their lengths and earliest starts."""
     ties, tied = UnionFind(len(problem.owner)), dict[int, set[int]]()
     for u, v, seconds, _, _ in work.counted(problem.equalities):
         ties.tie(u, v, seconds)
         for p in (u, v):
             tied.setdefault(problem.owner[p], set()).add(p)
     for b, (timing, first) in enumerate(work.counted(zip(problem.timings, problem.first, strict=True), 5)):
-        if (earliest := problem.earliest[b]) > -inf:
-            yield Edge(ORIGIN, first, earliest, Link(ORIGIN, first, earliest))
         if timing.rigid:
+            network.add_chain(first, problem.earliest[b], ())
             continue
-        least, most = list(timing.arrays.least), timing.arrays.most
-        if most is None:
-            points = sorted(tied.get(b, ()))
-            drop_least_gaps(least, [(p - first, (ties.find(p), ties.shift[p])) for p in points])
-        for p, seconds in enumerate(least, first):
-            yield Edge(p, p + 1, seconds, Link(p, p + 1, seconds))
+        least, most = timing.arrays.least, timing.arrays.most
+        if most is None and len(points := tied.get(b, ())) > 1:
+            stated = list(least)
+            drop_least_gaps(stated, [(p - first, (ties.find(p), ties.shift[p])) for p in sorted(points)])
+            least = tuple(stated)
+        network.add_chain(first, problem.earliest[b], least)
         for p, seconds in enumerate(most or (), first):
             if seconds < inf:
-                yield Edge(p + 1, p, -seconds, Link(p + 1, p, -seconds))
+                network.add(Link(p + 1, p, -seconds))

@@ -12,7 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Link
 from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
 from realizer.scheduling.graphs import components
-from realizer.scheduling.model import Index, Model, drop_least_gaps
+from realizer.scheduling.model import LOOSE, Index, Model, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Relation
 from realizer.scheduling.rigid_clusters import RigidClusters
 
@@ -212,8 +212,17 @@ def _anchor(model: Model, group: Group) -> int:
 def _yield_to_stated(model: Model, gaps: Index) -> bool:
     """Drop the least gaps within a length that the document states, except in bounded behaviours."""
     changed = False
-    owners, firsts = np.unique(model.owner[model.gap[gaps]], return_index=True)
-    for b, k in work.counted(zip(owners.tolist(), gaps[firsts].tolist(), strict=True), 10):
+    tied, owner, root = model.tied, model.owner, model.root
+    tied = tied[np.lexsort((tied, root[tied], owner[tied]))]
+    p, q = tied[:-1], tied[1:]
+    least = np.zeros(len(owner))
+    least[model.gap + 1] = model.least
+    room, length = np.cumsum(least)[[p, q]], model.shift[q] - model.shift[p]
+    short = (length >= -LOOSE) & (length < room[1] - room[0]) & (owner[p] == owner[q]) & (root[p] == root[q])
+    owners, firsts = np.unique(owner[model.gap[gaps]], return_index=True)
+    named = np.isin(owners, owner[p[short]])
+    begins = zip(owners[named].tolist(), gaps[firsts[named]].tolist(), strict=True)
+    for b, k in work.counted(begins, 10):
         first, last = int(model.first[b]), int(model.last[b])
         if (model.most[k : k + last - first] < np.inf).any():
             continue

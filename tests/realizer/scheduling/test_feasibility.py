@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer import schedule
-from realizer.scheduling.conflict import choose, in_words
-from realizer.scheduling.feasibility import ConstraintNetwork, Edge, conflicts_of
+from realizer.scheduling.conflict import Link, choose, in_words
+from realizer.scheduling.feasibility import ConstraintNetwork, conflicts_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.solve import Solution, solve
 from tests.example_counts import examples
@@ -86,28 +86,28 @@ def test_conflicts_of_a_large_block_drop_only_what_cannot_be() -> None:
 )
 def test_network_refuses_what_contradicts_what_it_has(steps: list[tuple[int, int, int, int]]) -> None:
     """Whatever was added and removed before: an inequality is refused iff it closes a positive cycle."""
-    network, present = ConstraintNetwork(6), list[Edge]()
+    network, present = ConstraintNetwork(6), list[Link]()
     for point in range(1, 6):
-        assert not network.add(Edge(ORIGIN, point, 0.0, None))
+        assert not network.add(Link(ORIGIN, point, 0.0))
     for u, v, seconds, turn in steps:
         if turn == 0 and present:
             network.remove([present.pop(u % len(present))])
             continue
-        edge = Edge(u, v, float(seconds), None)
-        cycle = network.add(edge)
-        assert bool(cycle) is not holds([*present, edge])
+        link = Link(u, v, float(seconds))
+        cycle = network.add(link)
+        assert bool(cycle) is not holds([*present, link])
         if cycle:
-            assert edge in cycle
+            assert link in cycle
             assert sum(step.seconds for step in cycle) > 0
             assert [step.v for step in cycle] == [step.u for step in cycle[1:] + cycle[:1]]
         else:
-            present.append(edge)
+            present.append(link)
 
 
-def holds(edges: list[Edge]) -> bool:
+def holds(links: list[Link]) -> bool:
     """Return whether times satisfy all inequalities, and no point is before point 0."""
     times = [0.0] * 6
     for _ in range(7):
-        for edge in edges:
-            times[edge.v] = max(times[edge.v], times[edge.u] + edge.seconds)
-    return times[ORIGIN] == 0.0 and all(times[e.v] >= times[e.u] + e.seconds for e in edges)
+        for link in links:
+            times[link.v] = max(times[link.v], times[link.u] + link.seconds)
+    return times[ORIGIN] == 0.0 and all(times[e.v] >= times[e.u] + e.seconds for e in links)
