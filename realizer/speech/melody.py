@@ -152,11 +152,13 @@ def _heard(utterance: Utterance) -> Melody:
     rate = utterance.sample_rate / step
     count = round(_end(utterance) * rate)
     pcm = utterance.pcm[: count * step]
-    parts = np.pad(pcm, (0, count * step - len(pcm))).reshape(-1, step).astype(np.float32)
-    samples = parts @ np.full(step, 1.0 / step, np.float32)
+    parts = np.zeros(count * step, np.float32)
+    parts[: len(pcm)] = pcm
+    samples = parts.reshape(-1, step) @ np.full(step, 1.0 / step, np.float32)
     count = _count(utterance)
     begins = (np.arange(count) * rate / RATE).astype(int)
-    padded = np.pad(samples, (WINDOW // 2, max(0, int(begins[-1]) + WINDOW // 2 - len(samples))))
+    padded = np.zeros(WINDOW // 2 + max(len(samples), int(begins[-1]) + WINDOW // 2), np.float32)
+    padded[WINDOW // 2 :][: len(samples)] = samples
     blocks = (begins[k : k + BLOCK] for k in range(0, count, BLOCK))
     found = [_analysed(padded[at[:, None] + np.arange(WINDOW)], rate) for at in blocks]
     power, period, likeness = (np.concatenate(column) for column in zip(*found, strict=True))
@@ -228,5 +230,6 @@ def _suggested(utterance: Utterance) -> Melody:
 
 def _smoothed(values: Float64) -> Float64:
     """Return the values after a short low-pass filter without delay, about 4 Hz."""
-    smooth: Float64 = np.convolve(np.pad(values, 2, "edge"), [0.1, 0.2, 0.4, 0.2, 0.1], "valid")
+    padded = values[np.arange(-2, len(values) + 2).clip(0, len(values) - 1)]
+    smooth: Float64 = np.convolve(padded, [0.1, 0.2, 0.4, 0.2, 0.1], "valid")
     return smooth

@@ -111,7 +111,8 @@ def _angles(
 def _averaged(values: Float64, seconds: float) -> Float64:
     around = round(seconds * RATE / 2)
     weights = np.full(2 * around + 1, 1.0 / (2 * around + 1))
-    averaged: Float64 = np.convolve(np.pad(values, around, "edge"), weights, "valid")
+    padded = values[np.arange(-around, len(values) + around).clip(0, len(values) - 1)]
+    averaged: Float64 = np.convolve(padded, weights, "valid")
     return averaged
 
 

@@ -1,8 +1,9 @@
 """The espeak-ng voice; its engine runs in a process of its own."""
 
 import importlib.util
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -53,7 +54,7 @@ class EspeakVoice(EngineVoice):
 
     def _synthesize(self, request: SpeechRequest, script: Script) -> Utterance:
         hello = self._process.hello()
-        voice, warnings = choose_voice(hello, request.voice or self._voice, request.language)
+        voice, warnings = self._choose(request.voice or self._voice, request.language)
         wpm = round(min(FASTEST, max(SLOWEST, WORDS_A_MINUTE * request.rate)))
         document = write_document(script)
         head, body = self._process.ask({"op": "say", "text": document.text, "voice": voice, "wpm": wpm})
@@ -63,6 +64,10 @@ class EspeakVoice(EngineVoice):
         if not any(phoneme.ipa for phoneme in said.phonemes) and not script.is_silent:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
         return replace(said, warnings=(*script.warnings, *warnings))
+
+    @cached_property
+    def _choose(self) -> Callable[[str | None, str], tuple[str, tuple[str, ...]]]:
+        return lru_cache(maxsize=100)(partial(choose_voice, self._process.hello()))
 
     def _word_phonemes(self, voice: str, words: Sequence[str]) -> list[tuple[str, ...]]:
         known = dict(self._alone)
