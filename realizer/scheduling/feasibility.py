@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
-from heapq import heappop, heappush
+from heapq import heappop, heappush, heappushpop
 from itertools import accumulate
 from math import inf
 from typing import TypeAlias
@@ -15,6 +15,7 @@ from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import LOOSE, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Part, Problem
 
+STEPS = 16  # of a search that are counted at once
 # The causes of times that follow from the point before and from the earliest start of a behaviour.
 _BEFORE, _EARLIEST = Link(ORIGIN, ORIGIN, 0.0), Link(ORIGIN, ORIGIN, 0.0)
 
@@ -57,15 +58,16 @@ class ConstraintNetwork:
 
     def _raise(self, link: Link) -> list[Link]:
         """Raise times so that an inequality holds; or leave them, and return a cycle."""
-        level, cause, least, order, steps = self._level, self._cause, self._least, 0, 0
+        level, cause, least, out = self._level, self._cause, self._least, self._out
         before: dict[int, tuple[float, Link | None]] = {}
         # The point that rises most comes first; so each rises once, as in Dijkstra's algorithm.
-        queue: list[tuple[float, int, Step]] = [(0.0, 0, (link.u, link.v, link.seconds, link))]
-        while queue:
-            steps += 1
-            step = heappop(queue)[2]
+        queue: list[tuple[float, int, Step]] = []
+        latest: tuple[float, int, Step] | None = (0.0, 0, (link.u, link.v, link.seconds, link))
+        order = steps = 0
+        while latest is not None or queue:
+            step = (heappop(queue) if latest is None else heappushpop(queue, latest))[2]
             u, v, seconds, reason = step
-            time = level[u] + seconds
+            latest, steps, time = None, steps + 1, level[u] + seconds
             if time <= level[v] + LOOSE:
                 continue
             if v in (ORIGIN, link.u):
@@ -73,18 +75,23 @@ class ConstraintNetwork:
                 for point, (old, earlier) in before.items():
                     level[point], cause[point] = old, earlier
                 return cycle
-            work.count(2 + steps)
-            steps = 0
-            before.setdefault(v, (level[v], cause[v]))
+            if steps > STEPS:
+                work.count(3 * steps)
+                steps = 0
+            if v not in before:
+                before[v] = level[v], cause[v]
             level[v], cause[v] = time, reason
             if (rise := time + least[v] - level[v + 1]) > LOOSE:
                 order += 1
-                heappush(queue, (-rise, order, (v, v + 1, least[v], _BEFORE)))
-            for following in self._out.get(v, ()):
+                latest = -rise, order, (v, v + 1, least[v], _BEFORE)
+            for following in out.get(v, ()):
                 rise = time + following.seconds - level[following.v]
                 if rise > LOOSE:
+                    if latest is not None:
+                        heappush(queue, latest)
                     order += 1
-                    heappush(queue, (-rise, order, (v, following.v, following.seconds, following)))
+                    latest = -rise, order, (v, following.v, following.seconds, following)
+        work.count(3 * steps)
         return []
 
     def remove(self, links: Iterable[Link], unused: range = range(0)) -> None:
@@ -115,12 +122,14 @@ class ConstraintNetwork:
 
     def isolate(self, points: range) -> None:
         """Remove all inequalities of successive points of which the others have no chain."""
+        links = dict.fromkeys(link for p in points for link in (*self._out.get(p, ()), *self._in.get(p, ())))
         for p in points:
             self._level[p] = self._earliest[p] = self._least[p] = -inf
             self._cause[p] = None
-        self.remove(
-            dict.fromkeys(link for p in points for link in (*self._out.get(p, ()), *self._in.get(p, ())))
-        )
+        self.remove(links)
+        for p in points:
+            self._out.pop(p, None)
+            self._in.pop(p, None)
 
     def _steps_from(self, point: int) -> list[Step]:
         steps = [(point, link.v, link.seconds, link) for link in self._out.get(point, ())]
@@ -161,42 +170,43 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     """
     network = ConstraintNetwork(len(problem.owner))
     _add_lengths(network, problem)
-    number = {id(part): n for n, part in enumerate(problem.behaviours)}
-    relations = [(r, True) for r in problem.equalities] + [(r, False) for r in problem.orders]
-    links: dict[int, list[Link]] = {id(r.part): [] for r, _ in relations}
+    number = {part: n for n, part in enumerate(problem.behaviours)}
+    relations = problem.equalities + problem.orders
+    links = defaultdict[Part, list[Link]](list)  # of the present parts
     constraints: dict[str, list[Part]] = {}  # that name a behaviour
-    for part in {id(r.part): r.part for r, _ in relations if r.part.is_constraint}.values():
+    for part in dict.fromkeys(r.part for r in relations if r.part.is_constraint):
         for name in part.names:
             constraints.setdefault(name, []).append(part)
-    gone: set[int] = set()  # parts
+    gone: set[Part] = set()
     absent: set[int] = set()  # numbers of behaviours
     conflicts: list[Conflict] = []
 
     def drop(part: Part) -> None:
-        gone.add(id(part))
-        if (n := number.get(id(part))) is None:
-            network.remove(links[id(part)])
+        gone.add(part)
+        own = links.pop(part, ())
+        if (n := number.get(part)) is None:
+            network.remove(own)
             return
         absent.add(n)
         points = range(problem.first[n], problem.first[n] + len(problem.timings[n].points))
-        network.remove(links.get(id(part), ()), points)
+        network.remove(own, points)
         network.isolate(points)
         for constraint in constraints.get(part.id, ()):
-            gone.add(id(constraint))
-            network.remove(links[id(constraint)])
+            gone.add(constraint)
+            network.remove(links.pop(constraint, ()))
 
-    for relation, is_equality in work.counted(relations, 2):
+    for k, relation in enumerate(work.counted(relations, 2)):
         u, v, seconds, part, _ = relation
-        # An equality is time[u] = time[v] + seconds.
-        for link in (
-            (Link(v, u, seconds, relation), Link(u, v, -seconds, relation))
-            if is_equality
-            else (Link(u, v, seconds, relation),)
-        ):
-            while id(part) not in gone and absent.isdisjoint((problem.owner[u], problem.owner[v])):
+        if k < len(problem.equalities):  # time[u] = time[v] + seconds
+            pair = [Link(v, u, seconds, relation), Link(u, v, -seconds, relation)]
+        else:
+            pair = [Link(u, v, seconds, relation)]
+        ends = problem.owner[u], problem.owner[v]
+        for link in pair:
+            while part not in gone and absent.isdisjoint(ends):
                 cycle = network.add(link)
                 if not cycle:
-                    links[id(part)].append(link)
+                    links[part].append(link)
                     break
                 conflict = conflict_of(problem, cycle)
                 conflicts.append(conflict)
