@@ -35,8 +35,8 @@ def _words() -> Mapping[type[Behaviour], tuple[str, tuple[Row, ...]]]:
 
 
 @lru_cache(maxsize=1000)
-def _is_word(rows: tuple[Row, ...], value: str) -> bool:
-    return any(row.fits(value) for row in rows)
+def _is_word(tag: str, value: str) -> bool:
+    return any(row.fits(value) for row in _words()[VOCABULARY[tag]][1])
 
 
 def has_words_of_dialects(block: Block) -> bool:
@@ -48,9 +48,9 @@ def _any(nodes: Iterable[Behaviour]) -> bool:
     words = _words()
     for node in nodes:
         next_element()
-        if (word := words.get(type(node))) is not None and _is_word(word[1], getattr(node, word[0])):
+        if (word := words.get(type(node))) is not None and _is_word(node.tag, getattr(node, word[0])):
             return True
-        if any(name.startswith(_SMARTBODY) for name in node.unknown_attributes):
+        if node.unknown_attributes and any(name.startswith(_SMARTBODY) for name in node.unknown_attributes):
             return True
         parts: Sequence[Behaviour] = node.parts if isinstance(node, Face | FaceShift) else ()
         if parts and _any(parts):

@@ -16,7 +16,8 @@ def external_refs(block: Block) -> tuple[SyncRef, ...]:
 def references(block: Block) -> Iterator[SyncRef]:
     """Yield the references of its behaviours, of syncs in their text, and of its constraints."""
     for behaviour in work.counted(block.behaviours):
-        yield from (ref for _, ref in behaviour.references)
+        for _, ref in behaviour.references:
+            yield ref
     for constraint in work.counted(block.constraints):
         yield from constraint.references
 

@@ -145,17 +145,19 @@ def problem_of(
     """
     problem, own = Problem(), members[0].block.id
     first: dict[tuple[str, str], int] = {}
-    present: list[tuple[Member, Behaviour, Part]] = []
+    present: list[tuple[Member, Behaviour, Part, int, tuple[str, ...]]] = []
     for member in members:
         block, required, places = member.block, member.block.required, member.block.places
         for order, node in enumerate(work.counted(block.behaviours, 3)):
             id = node.id
-            if id not in member.timings or (block.id, id) in first:
+            timing = member.timings.get(id)
+            if timing is None or (block.id, id) in first:
                 continue
             place = places.get(id)
+            full = f"{block.id}:{id}"
             part = Part(
-                f"{block.id}:{id}",
-                id if block.id == own else f"{block.id}:{id}",
+                full,
+                id if block.id == own else full,
                 member.is_fixed or id in required,
                 member.priorities.get(id, 0.0),
                 order,
@@ -163,15 +165,15 @@ def problem_of(
             )
             # `_pass` bounds the future points of a block that has begun.
             earliest = -np.inf if id in member.passed_times else member.earliest
-            first[block.id, id] = problem.add(part, member.timings[id], earliest)
-            present.append((member, node, part))
+            start = first[block.id, id] = problem.add(part, timing, earliest)
+            present.append((member, node, part, start, timing.points))
     resolvers = {
         m.block.id: _ReferenceResolver(m, {o.block.id: o for o in members}, first, outside) for m in members
     }
-    for member, node, part in work.counted(present, 3):
-        start, points = first[member.block.id, node.id], member.timings[node.id].points
+    for member, node, part, start, points in work.counted(present, 3):
+        passed = member.passed_times.get(node.id, {})
         if node.id in member.passed_times:
-            _pass(problem, member, part, start, points, member.passed_times[node.id])
+            _pass(problem, member, part, start, points, passed)
         resolver = resolvers[member.block.id]
         late = member.late.get(node.id, 0.0)
         for sync, ref in node.references:
@@ -185,7 +187,7 @@ def problem_of(
                     continue  # it plays already, and the point has been forgotten since
                 problem.faults.append((part, str(fault)))
                 break
-            if target[0] == ORIGIN and sync in member.passed_times.get(node.id, ()):
+            if target[0] == ORIGIN and sync in passed:
                 continue  # the other end may have moved since
             words = (f"{part.name}:{sync}", "=", ref)
             problem.equalities.append(Relation(start + points.index(sync), *target, part, words))
