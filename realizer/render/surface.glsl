@@ -11,7 +11,7 @@ uniform sampler2D foldMap;     // depth of the folds
 uniform highp sampler2D shadowMap;   // depths as the key lamp sees them, 0 near the lamp to 1
 uniform mediump sampler2DArray mirrorMap;  // the environment by roughness, octahedral
 
-uniform vec3 surfaceWrap[5];   // surfaces.toml, a row for each kind
+uniform vec4 surfaceWrap[5];   // surfaces.toml, a row for each kind: wrap, shaded
 uniform vec3 surfaceSoft[5];
 uniform vec4 surfaceShine[5];  // reflection, sharp, sharp_share, through
 uniform int hairKind, eyeKind;
@@ -127,7 +127,8 @@ float glintOf(vec3 n, vec3 view, float rough) {
 //   values: occlusion, roughness, thickness 0..1, and the share of the key light that is not in shadow.
 //   view: unit vector to the eye.
 vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 values, vec3 view) {
-  float occlusion = values.x, rough = values.y, thickness = values.z, seen = values.w;
+  float occlusion = values.x, rough = values.y, thickness = values.z;
+  float seen = mix(values.w, 1.0, surfaceWrap[kind].w * occlusion);
   vec4 shine = surfaceShine[kind];
   bool hair = kind == hairKind;
   float reach = 1.0 - directShare * (1.0 - occlusion);
@@ -135,7 +136,7 @@ vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 val
   float edge = pow(1.0 - min(nv, 1.0), rimPower) * reach;
   float rim = max(0.0, (dot(n, rimDirection) + 0.3) / 1.3) * edge;
   float thin = (1.0 - thickness) * shine.w * occlusion * occlusion;
-  vec3 wrap = surfaceWrap[kind];
+  vec3 wrap = surfaceWrap[kind].rgb;
   vec3 facing = max((nl + (lit - nl) * surfaceSoft[kind] + wrap) / (1.0 + wrap), 0.0);
   // Cards are made of flat pieces; the strands that they show bend as evenly as the normals do.
   strand = unitOf(strand - dot(strand, even) * even);

@@ -8,7 +8,7 @@ from realizer.core.array_types import Float32
 from realizer.tables import toml_table
 
 # Columns of `surfaces`.
-WRAP, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH, COAT = 0, 3, 6, 7, 8, 9, 10
+WRAP, SHADED, SOFT, REFLECTION, SHARP, SHARP_SHARE, THROUGH, COAT = 0, 3, 4, 7, 8, 9, 10, 11
 GLINT = 2.0  # brightness of the key lamp's reflection on a coat, as a share of its light on white
 DIRECT = 0.55  # how far occlusion darkens light of lamps, which shadows darken already
 BENT = 1 / 1.336  # how light is bent at the cornea
@@ -20,5 +20,5 @@ THIN = (0.50, 0.13, 0.07)  # colour of light that has come through thin skin
 def surfaces() -> Float32:
     """Return a row of surfaces.toml for each kind of surface, float32."""
     rows = toml_table("surfaces.toml").values()
-    names = ("wrap", "soft", "reflection", "sharp", "sharp_share", "through", "coat")
+    names = ("wrap", "shaded", "soft", "reflection", "sharp", "sharp_share", "through", "coat")
     return np.array([np.hstack([row[name] for name in names]) for row in rows], np.float32)

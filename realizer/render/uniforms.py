@@ -9,7 +9,18 @@ from realizer.core.array_types import Float32
 from realizer.face.drawn_mesh import EYE, HAIR
 from realizer.render.lamp_view import ASIDE, NEAR, SIDE, SOFT, LampView
 from realizer.render.light import Light, unit
-from realizer.render.surfaces import BENT, BOWL, DIRECT, GLINT, REFLECTION, THIN, THROUGH, WRAP, surfaces
+from realizer.render.surfaces import (
+    BENT,
+    BOWL,
+    DIRECT,
+    GLINT,
+    REFLECTION,
+    SHADED,
+    THIN,
+    THROUGH,
+    WRAP,
+    surfaces,
+)
 from realizer.render.surfaces import SOFT as EVEN
 from realizer.render.textures import DEPTH, FOLD_SHADE, IRIS, STEEPEST
 
@@ -24,7 +35,7 @@ def uniforms_of(light: Light, lamp: LampView) -> Mapping[str, Any]:
     view = np.eye(4, dtype=np.float32)
     view[:3] = lamp.matrix / np.array([[SIDE], [SIDE], [1]])
     return {
-        "surfaceWrap": rows[:, WRAP : WRAP + 3].tolist(),
+        "surfaceWrap": rows[:, WRAP : SHADED + 1].tolist(),
         "surfaceSoft": rows[:, EVEN : EVEN + 3].tolist(),
         "surfaceShine": rows[:, REFLECTION : THROUGH + 1].tolist(),
         "hairKind": HAIR,

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN
+from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN, WET
 from realizer.render.shading import BRIGHTEST, STEPS, reflected, tone_curve, unit
-from realizer.render.surfaces import surfaces
+from realizer.render.surfaces import REFLECTION, SHADED, surfaces
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
 FRONT, SIDE, BACK = (np.float32([0, 0, 1]), np.float32([1, 0, 0]), np.float32([0, 0, -1]))
@@ -46,6 +46,12 @@ def test_reflected_light_is_less_in_shadow_and_in_cavities(kind):
     assert (light(kind, values=(0.2, 0.5, 1, 1)) < whole).all()
 
 
+def test_reflected_light_scatters_into_shadow_where_nothing_hides_the_surface():
+    lit, shaded, hidden = (light(WET, values=(open_, 0.5, 1, s)) for open_, s in ((1, 1), (1, 0), (0.1, 0)))
+    assert shaded == pytest.approx(surfaces()[WET, SHADED] * lit)
+    assert (hidden < 0.2 * shaded).all()
+
+
 def test_reflected_light_of_skin_reaches_further_in_red():
     red, green, blue = light(SKIN, normal=SIDE, view=unit((np.float32(1), np.float32(0), np.float32(1))))
     assert red > green > blue
@@ -59,7 +65,7 @@ def test_reflected_light_comes_through_thin_skin():
 
 def test_reflected_light_of_a_smooth_surface_mirrors_the_room():
     room = light(EYE, key=BACK, sky=1.0, albedo=0 * GREY, values=(1, 0.1, 1, 0))
-    assert room == pytest.approx(surfaces()[EYE][6], abs=0.01)
+    assert room == pytest.approx(surfaces()[EYE][REFLECTION], abs=0.01)
     grazing = light(EYE, normal=FRONT, view=unit((np.float32(1), np.float32(0), np.float32(0.1))), key=BACK,
                     sky=1.0, albedo=0 * GREY, values=(1, 0.1, 1, 0))  # fmt: skip
     assert (grazing > 5 * room).all()

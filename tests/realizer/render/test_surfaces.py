@@ -3,7 +3,7 @@
 import numpy as np
 
 from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN, WET
-from realizer.render.surfaces import COAT, REFLECTION, SHARP_SHARE, SOFT, THROUGH, WRAP, surfaces
+from realizer.render.surfaces import COAT, REFLECTION, SHADED, SHARP_SHARE, SOFT, THROUGH, WRAP, surfaces
 
 
 def test_surfaces_have_a_row_for_each_kind():
@@ -19,6 +19,6 @@ def test_surfaces_keep_shares_between_0_and_1():
 
 def test_surfaces_let_red_reach_furthest_in_skin():
     skin = surfaces()[SKIN]
-    assert (np.diff(skin[WRAP:SOFT]) < 0).all()
+    assert (np.diff(skin[WRAP:SHADED]) < 0).all()
     assert (np.diff(skin[SOFT:REFLECTION]) < 0).all()
     assert surfaces()[:, THROUGH].argmax() == SKIN
