@@ -22,8 +22,9 @@ from realizer.face.mesh_geometry import (
 from realizer.face.model import Face
 from realizer.face.subdivision import subdivided
 from realizer.facebuild.face_files import to_bytes
+from realizer.facebuild.hair.brows import brow
 from realizer.facebuild.hair.cards import Patch, joined
-from realizer.facebuild.hair.facial_hair import BEARD_CARDS, Margin, beard, brow, lashes
+from realizer.facebuild.hair.facial_hair import BEARD_CARDS, Margin, beard, lashes
 from realizer.facebuild.hair.grow import hair, tints
 from realizer.facebuild.hair.style import style_of
 from realizer.facebuild.person.recipe import Recipe, appearance_of

@@ -1,4 +1,4 @@
-"""Brows, lashes, beards and moustaches: cards that are rooted in the skin.
+"""Lashes, beards and moustaches: cards that are rooted in the skin.
 
 A hair's root lies between the corners of a triangle of the skin and goes wherever they go. The rest of the
 hair is a fixed way off its root that turns with the head alone: where the skin stretches, hairs move apart
@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer.face.mesh_geometry import flat_cross, triangle_normals, vertex_normals
+from realizer.face.mesh_geometry import triangle_normals
 from realizer.facebuild.hair.cards import LEVEL, Patch, ribbons
 from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.recipe import Appearance
 from realizer.facebuild.person.scalp import Scalp
 
-BEARD_CARDS = 950  # cards of a full beard
+BEARD_CARDS = 1150  # cards of a full beard
 LONG, WIDE = 0.024, 0.0046  # m, of a card on the chin of a full beard
 SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
@@ -51,9 +50,11 @@ def beard(
     # The strip between nose and lip is narrow, and hardly any triangle lies in it wholly.
     middle = at[triangles].mean(axis=1)
     lip = (middle[:, 1] > points["2.2"][1]) & (np.abs(middle[:, 0]) < points["8.3"][0] + 0.008)
-    low = np.where(lip, 0.05, 0.3)
+    low = np.where(lip, 0.15, 0.3)
     weight = area * np.where(lip, 3, 1) * smooth(where[triangles].mean(axis=1), low, low + 0.35)
-    pick = rng.choice(len(triangles), BEARD_CARDS, p=weight / weight.sum())
+    # Evenly: cards by chance alone would leave holes.
+    even = (np.arange(BEARD_CARDS) + rng.uniform(0, 1, BEARD_CARDS)) / BEARD_CARDS
+    pick = np.searchsorted(np.cumsum(weight / weight.sum()), even).clip(0, len(triangles) - 1)
     shares = rng.dirichlet((1.0, 1.0, 1.0), BEARD_CARDS)
     corners = triangles[pick]
     root = (at[corners] * shares[..., None]).sum(axis=1)
@@ -93,10 +94,10 @@ def beard(
     )  # fmt: skip
 
 
-UPPER, LOWER = 46, 20  # lashes of a lid
+UPPER, LOWER = 60, 26  # lashes of a lid
 LASH_ROWS = 4
 CURL = 0.55  # how much further than its root a lash's tip goes when the lid falls
-LASH_WIDE = 0.00036  # m; half of it is seen
+LASH_WIDE = 0.00046  # m; half of it is seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,95 +158,3 @@ def lashes(at: Float64, margin: Margin, colour: Any, length: float, rng: Any) ->
         places.transpose(1, 0, 2), ups.transpose(1, 0, 2), width, ["lash"] * count, tint,
         np.full((count, LASH_ROWS), 0.9), 0.0, (skin, shares),
     )  # fmt: skip
-
-
-BROW_CARDS = 120  # cards of a brow
-BROW_HALF = 0.0031  # m, half the width of its roots where it is widest
-BROW_LONG, BROW_WIDE = 0.0070, 0.0015  # m, of a card
-GREY = np.array([178, 174, 170.0])
-# Directions of hairs in degrees from outwards to up, by the place along the brow 0 (inner end) to 1; those of
-# the upper edge lean down by as much as those of the lower edge lean up.
-RISE = (0.0, 0.10, 0.25, 0.5, 0.75, 1.0), (82.0, 66.0, 40.0, 18.0, 2.0, -16.0)
-CROSS = 16.0
-BROW_ROWS = np.array([0.0, 0.5, 1.0])
-LIFT = 0.0002, 0.0006, 0.0006  # m above the skin at root, middle and tip
-
-
-def brow(
-    skin: tuple[Float64, Int32],
-    drawn: tuple[Float64, Int32],
-    points: Mapping[str, Float64],
-    side: int,
-    colour: Any,
-    look: Appearance,
-    rng: Any,
-) -> Patch:
-    """Return the cards of a brow.
-
-    Args:
-        skin: places (n, 3) and triangles of the skin's mesh; drawn: those that are drawn of it.
-        points: feature points, metres; side: 1 left, -1 right.
-        colour: sRGB of the brows.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    count = round(BROW_CARDS * look.brow_cover * (0.7 + 0.3 * look.brow_thick))
-    a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
-    x = np.abs([a[0] - side * (0.003 - look.brow_gap), (a[0] + b[0]) / 2, b[0], c[0] - side * 0.001])
-    arch = look.brow_arch
-    y = np.array([a[1] + 0.0008, (a[1] + b[1]) / 2 + 0.0008 + arch / 2, b[1] - 0.0016 + arch, c[1] - 0.0012])
-    middle = PchipInterpolator(x, y - look.brow_low)
-    t = (np.arange(count) + rng.uniform(0, 1, count)) / count
-    t = np.interp(t, (0, 0.08, 0.9, 1), (0, 0.11, 0.88, 1))  # thin at both ends
-    v = rng.uniform(-1, 1, count)
-    half = BROW_HALF * look.brow_thick * smooth(t, -0.30, 0.22) * (1 - 0.68 * smooth(t, 0.40, 1.0))
-    across = x[0] + (x[-1] - x[0]) * t
-    root = np.stack([across, middle(across) + v * half], 1)
-    slope = np.degrees(np.arctan(middle.derivative()(across)))
-    turn = np.interp(t, *RISE) + 0.7 * slope - CROSS * v * smooth(t, 0.05, 0.3) + rng.normal(0, 9, count)
-    turn = np.radians(turn)
-    long = BROW_LONG * look.brow_hair * rng.uniform(0.75, 1.2, count) * (1 - 0.35 * smooth(t, 0.6, 1.0))
-    long *= 0.75 + 0.25 * smooth(t, 0.0, 0.15)
-    bend = np.radians(18) * rng.uniform(0.4, 1.2, count)  # outwards and down along the hair
-    first = np.stack([np.cos(turn), np.sin(turn)], 1)
-    second = np.stack([np.cos(turn - bend), np.sin(turn - bend)], 1)
-    flat = np.stack([root, root + first * long[:, None] / 2, root + (first + second) * long[:, None] / 2], 1)
-    flat[..., 0] *= side
-    corners, shares = seen_from_front(*skin, flat[:, 0])
-    fine, weights = seen_from_front(*drawn, flat.reshape(-1, 2))
-    ups = unit((vertex_normals(*drawn)[fine] * weights[..., None]).sum(axis=1)).reshape(count, 3, 3)
-    places = (drawn[0][fine] * weights[..., None]).sum(axis=1).reshape(count, 3, 3)
-    places = places + ups * np.array(LIFT)[:, None] * rng.uniform(0.6, 1.6, (count, 1, 1))
-    white = look.brow_grey + 0.3 * rng.uniform(-1, 1, (count, 1)) * (1 - abs(2 * look.brow_grey - 1))
-    tint = np.array(colour, float) * (1 - white) + GREY * white
-    tint *= (1 + 0.18 * rng.uniform(-1, 1, (count, 1))) / LEVEL
-    width = BROW_WIDE * rng.uniform(0.8, 1.2, (count, 1)) * np.array([1.0, 1.0, 0.7])
-    light = np.broadcast_to(0.75 + 0.25 * BROW_ROWS, (count, 3))
-    return ribbons(
-        places, ups, width, ["brow"] * count, np.clip(tint, 0, 255), light, 0.0,
-        (corners, np.repeat(shares[:, None], 3, axis=1)),
-    )  # fmt: skip
-
-
-def seen_from_front(at: Float64, triangles: Int32, flat: Float64) -> tuple[Int32, Float64]:
-    """Return the corners (n, 3) of the foremost triangle at places (n, 2) in front view, and their shares.
-
-    A place beside all triangles gets the one that it misses by least, and shares that continue it.
-
-    Args:
-        at: (m, 3) metres.
-    """
-    low, high = flat.min(axis=0) - 0.01, flat.max(axis=0) + 0.01
-    inside = ((at[:, :2] > low) & (at[:, :2] < high)).all(axis=1) & (at[:, 2] > -0.03)
-    mine = triangles[inside[triangles].any(axis=1)]
-    a, b, c = (at[mine[:, k], :2] for k in range(3))
-    turn = flat_cross(b - a, c - a)
-    mine, a, b, c, turn = (part[turn > 1e-9] for part in (mine, a, b, c, turn))
-    place = flat[:, None]
-    s = flat_cross(place - a, c - a) / turn
-    t = flat_cross(b - a, place - a) / turn
-    out = np.maximum(np.maximum(-s, -t), np.maximum(s + t - 1, 0))
-    best = (out - 0.1 * at[mine, 2].mean(axis=1)).argmin(axis=1)
-    row = np.arange(len(flat))
-    s, t = s[row, best], t[row, best]
-    return mine[best], np.stack([1 - s - t, s, t], axis=1)

@@ -68,7 +68,7 @@ def beard(ground: Ground, lips: Lips) -> Float64:
     line = np.interp(
         aside,
         [0, 0.016, corner[0] + 0.006, 0.75 * lobe[0], lobe[0]],
-        [under_nose[1] + 0.004, under_nose[1] + 0.002, corner[1] + 0.006, corner[1] + 0.018, lobe[1] + 0.03],
+        [under_nose[1] + 0.004, under_nose[1] + 0.002, corner[1] + 0.006, corner[1] + 0.018, lobe[1] + 0.045],
     )
     face = smooth(at[:, 1] - line, 0.004, -0.008) * smooth(at[:, 1] - chin[1], -0.045, -0.010)
     before = smooth(at[:, 2] - lobe[2], 0.0, 0.012)

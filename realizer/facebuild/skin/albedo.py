@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32
+from realizer.facebuild.hair.brows import Brow, tint_of
 from realizer.facebuild.hair.strands import shadow
 from realizer.facebuild.hair.style import colour_of, style_of
 from realizer.facebuild.parts import smooth
@@ -15,6 +16,9 @@ from realizer.facebuild.skin.noise import ridges
 from realizer.facebuild.skin.skin import Skin
 
 EDGE = 0.0012  # m, of the noise in large spots
+NEAR = np.array([0.035, 0.018])  # m around the middle of a brow
+BROW = 0.8  # share of the colour of brows that is painted between their hairs
+LASHES = 0.75, 0.35  # that of lashes at their roots, of the upper and the lower lid
 
 
 def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
@@ -32,6 +36,7 @@ def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     _lips(skin, out)
     _beard(skin, out)
     _scalp(skin, out)
+    _brows(skin, out)
     _margins(skin, out)
     _mouth(skin, out)
     return np.clip(out, 0, 255)
@@ -126,6 +131,29 @@ def _margins(skin: Skin, out: Float32) -> None:
     # Between the wet edge of a lid and its lashes the skin is as pale as before.
     share = np.maximum(0.45 * smooth(edge, 0.35, 0.9), 0.7 * caruncle)
     out += skin.float(share)[:, None] * (_vector(skin.recipe.colours["corner"]) * 0.92 - out)
+    roots = np.zeros(len(skin.person.ground.at))
+    for lid in skin.lids:
+        for row, share in zip((lid.lower, lid.upper), LASHES[::-1], strict=True):
+            roots[row[2:-1]] = share
+    roots = skin.field(roots)
+    out += skin.float(roots * smooth(edge, 0.15, 0.6) * (1 - caruncle))[:, None] * (
+        _vector(skin.recipe.colours["lashes"]) - out
+    )
+
+
+def _brows(skin: Skin, out: Float32) -> None:
+    ground, look = skin.person.ground, skin.look
+    points = {name: ground.point(name) for name in ground.points}
+    colour = _vector(0.9 * tint_of(skin.recipe.colours["brows"], look))
+    for side in (1, -1):
+        line = Brow(points, side, look)
+        near = np.abs(skin.at[:, :2] * [side, 1] - [points["4.3"][0], points["4.3"][1]]) < NEAR
+        mask = near.all(axis=1) & (skin.at[:, 2] > points["3.7"][2] - NEAR[1])
+
+        def shade(at: Any, line: Brow = line, side: int = side) -> Any:
+            return line.shade(at[:, :2] * np.array([side, 1.0]), skin.seed + 46)
+
+        out += (BROW * skin.within(mask, shade))[:, None] * (colour - out)
 
 
 def _beard(skin: Skin, out: Float32) -> None:
@@ -136,7 +164,7 @@ def _beard(skin: Skin, out: Float32) -> None:
     where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
     where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0, 1.2)
     hair = _vector(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
-    shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.4, 0.9) * grown * 0.55)[:, None]
+    shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.2, 0.6) * grown * 0.55)[:, None]
     out += shade * (hair * 0.6 + _vector([30, 36, 40]) - out)
     _dots(skin, out, "stubble", np.clip(where * 1.6, 0, 1) * min(1.0, amount * 2), hair)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realizer.facebuild.skin import albedo
 from realizer.facebuild.skin.albedo import crease, paint_albedo
 from realizer.facebuild.skin.skin import Skin
 
@@ -19,6 +20,26 @@ def test_paint_albedo_keeps_the_colour_of_the_skin_and_reddens_lips(skin: Skin) 
     lips = colours[skin.red > 0.95].mean(axis=0)
     assert lips[0] - lips[1] > colours[forehead, 0].mean() - colours[forehead, 1].mean()
     assert 0 <= colours.min() < colours.max() <= 255
+
+
+def test_paint_albedo_darkens_brows(skin: Skin) -> None:
+    none = np.zeros(len(skin.at), np.float32)
+    light = paint_albedo(skin, none, none).mean(axis=1)
+    forehead = skin.person.ground.point("9.12") + np.array([0, 0.03, 0])
+    dark, plain = (
+        light[np.linalg.norm(skin.at - at, axis=1) < far].mean()
+        for at, far in ((skin.person.ground.point("4.3"), 0.005), (forehead, 0.012))
+    )
+    assert dark < 0.6 * plain
+
+
+def test_paint_albedo_darkens_the_roots_of_lashes(skin: Skin, monkeypatch: pytest.MonkeyPatch) -> None:
+    none = np.zeros(len(skin.at), np.float32)
+    whole = paint_albedo(skin, none, none)
+    monkeypatch.setattr(albedo, "LASHES", (0.0, 0.0))
+    change = (paint_albedo(skin, none, none) - whole).mean(axis=1)
+    assert change.max() > 10
+    assert skin.margins()[0][change > 1].min() > 0.1
 
 
 def test_crease_is_on_the_lips_only(skin: Skin) -> None:
