@@ -10,7 +10,7 @@ from realizer.face.basis import JAW_SIN
 from realizer.facebuild.fix_flipped import JAW, LIPS, symmetrize, without_flips
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
-from realizer.facebuild.person.lids import lid_fields
+from realizer.facebuild.person.lids import Lid, lid_fields
 from realizer.facebuild.person.lips import Lips, lip_fields
 from realizer.facebuild.person.makehuman import FORWARD, LEFT, UP, Ground, scaled
 
@@ -21,6 +21,7 @@ SLACK = 30  # times that the throat's part in the jaw is softened
 BACKWARDS = 0.45  # metres that the corners of the mouth go back for each metre that the chin falls,
 FROM_MIDDLE = 0.1, 1.0  # along the lips more and more between these u,
 CHEEK = 0.035  # m beside them less and less up to there
+BROW = 0.004, 0.009  # m from a brow's line that its skin goes along, and where that has no part any more
 LOWEST = -0.16  # m; below it only the head's FAPs move anything
 
 # Where between wing and eye the side of the nose is raised most, m around, and by what share of the tip.
@@ -96,6 +97,13 @@ def _brows(ground: Ground) -> dict[int, Float64]:
     profile[:, 1] = np.clip(profile[:, 1], 0, 1.25)
     profile[:, 0] = 0
     profile[:, 2] = np.clip(profile[:, 2], -0.6, 0.6)
+    # A brow goes as a whole, and the skin below it less and less, so that none hangs over the eye.
+    x, lid = np.abs(at[:, 0]), Lid(ground, 1)
+    middle = np.interp(x, across, [p[1] for p in stations])
+    whole = smooth(np.abs(at[:, 1] - middle), *BROW[::-1]) * (raise_[:, 1] > 0)
+    profile[:, 1] += whole * (1 - profile[:, 1])
+    edge = np.interp(x, lid.x, lid.high)
+    profile *= np.clip((at[:, 1] - edge) / (middle - BROW[0] - edge), 0, 1)[:, None]
     # The lid's edge does not follow the brow: FAPs 19 and 20 own it.
     lids = (ground.ellipsoid(ground.point(name), (0.024, 0.0095, 0.03), 0.5) for name in ("3.1", "3.2"))
     calm = 1 - np.maximum(*lids)

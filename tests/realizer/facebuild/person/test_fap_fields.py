@@ -7,6 +7,7 @@ import pytest
 
 from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
 from realizer.facebuild.mpeg4.fields import WAYS
+from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.makehuman import Ground
 from realizer.tables import faps
 
@@ -42,6 +43,17 @@ def test_face_fields_of_brows_share_what_lies_between(ground: Ground, fields: Fi
         for other, name in names.items():
             up = fields[fap][ground.points[name], 1]
             assert up == pytest.approx(1 if other == fap else 0, abs=1e-6)
+
+
+def test_face_fields_of_brows_keep_the_skin_below_above_the_lid(ground: Ground, fields: Fields) -> None:
+    lid = Lid(ground, 1)
+    at = ground.at[np.concatenate(lid.rings[1:])]
+    off = at[:, 1] - np.interp(at[:, 0], lid.x, lid.high)
+    over = (at[:, 0] > lid.x[3]) & (at[:, 0] < lid.x[-3]) & (off > 0.001)
+    fall = 0.6 * (ground.point("4.3")[1] - ground.point("3.1")[1])
+    down = fall * sum(fields[fap][np.concatenate(lid.rings[1:]), 1] for fap in (31, 33, 35))
+    assert over.sum() > 20
+    assert (off > down)[over].all()
 
 
 def test_face_fields_of_the_jaw_leave_the_upper_face(ground: Ground, fields: Fields) -> None:
