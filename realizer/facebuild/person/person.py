@@ -152,7 +152,8 @@ class _Landmark:
 Ball = tuple[Float64, float]  # centre (3,) and radius, metres
 INSET = 0.00015  # m; how much deeper the ball lies than the socket's fit
 RISE = 0.085  # of the distance between the lids: how far pupils are above the middle, as people's are
-CLEAR = 0.00030, 0.00065  # m from the ball to the lid's edge and to the ring of vertices in front of it
+CLEAR = 0.00030, 0.00065, 0.0008, 0.0008, 0.0008, 0.0008  # m from the ball to the rings of the lid, outwards,
+AROUND = 0.0008, 0.0002  # and to other skin, of which no more is in the ball by now
 
 
 def balls(ground: Ground) -> tuple[Ball, Ball]:
@@ -167,11 +168,15 @@ def balls(ground: Ground) -> tuple[Ball, Ball]:
 
 
 def cleared(ground: Ground, eyes: tuple[Ball, Ball]) -> Float64:
-    """Return the base mesh (n, 3) with edges of the lids that are not inside balls and corneas."""
+    """Return the base mesh (n, 3) with lids and the skin around them outside balls and corneas."""
     at = ground.at.copy()
     for side, (centre, radius) in zip((1, -1), eyes, strict=True):
         before, _ = cornea(radius)
-        for ring, room in zip(Lid(ground, side).rings, CLEAR, strict=False):
+        lid = Lid(ground, side)
+        known = [*lid.rings, [vertex for vertex, _, _ in lid.followers(ground)[1]]]
+        out = ground.body & (np.linalg.norm(at - centre, axis=1) > radius - AROUND[1])
+        others = np.setdiff1d(np.flatnonzero(out), np.concatenate(known)).tolist()
+        for ring, room in zip((*lid.rings, others), (*CLEAR, AROUND[0]), strict=True):
             for middle, size in ((centre, radius), (centre + np.array([0, 0, before]), CORNEA)):
                 away = at[ring] - middle
                 left = (size + room) ** 2 - away[:, 0] ** 2 - away[:, 1] ** 2
