@@ -206,7 +206,7 @@ def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view:
     occlusion, rough, thickness, reached = values
     lamps, sh, levels, rim_power, glint = lights
     one, zero = np.float32(1), np.float32(0)
-    reached += row[SHADED] * occlusion * (one - reached)
+    reached += row[SHADED] * occlusion * occlusion * (one - reached)
     key, rim = lamps[KEY, 0], lamps[RIM, 0]
     reach = one - np.float32(DIRECT) * (one - occlusion)
     nv, nl, nl_smooth = max(dot(n, view), np.float32(1e-3)), dot(n, key), dot(smooth, key)

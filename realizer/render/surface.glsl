@@ -128,7 +128,7 @@ float glintOf(vec3 n, vec3 view, float rough) {
 //   view: unit vector to the eye.
 vec3 reflectedBy(int kind, vec3 albedo, vec3 n, vec3 even, vec3 strand, vec4 values, vec3 view) {
   float occlusion = values.x, rough = values.y, thickness = values.z;
-  float seen = mix(values.w, 1.0, surfaceWrap[kind].w * occlusion);
+  float seen = mix(values.w, 1.0, surfaceWrap[kind].w * occlusion * occlusion);
   vec4 shine = surfaceShine[kind];
   bool hair = kind == hairKind;
   float reach = 1.0 - directShare * (1.0 - occlusion);
