@@ -58,7 +58,7 @@ class Brow:
         """Return the directions of hairs, radians from outwards to up; v is -1 (lower edge) to 1 (upper)."""
         across = self.ends[0] + (self.ends[1] - self.ends[0]) * t
         slope = np.degrees(np.arctan(self.middle.derivative()(across)))
-        return np.radians(np.interp(t, *RISE) + 0.7 * slope - CROSS * v * smooth(t, 0.05, 0.3))
+        return np.asarray(np.radians(np.interp(t, *RISE) + 0.7 * slope - CROSS * v * smooth(t, 0.05, 0.3)))
 
     def long(self, t: Float64) -> Float64:
         """Return the mean length of hairs, metres."""

@@ -131,11 +131,11 @@ def _margins(skin: Skin, out: Float32) -> None:
     # Between the wet edge of a lid and its lashes the skin is as pale as before.
     share = np.maximum(0.45 * smooth(edge, 0.35, 0.9), 0.7 * caruncle)
     out += skin.float(share)[:, None] * (_vector(skin.recipe.colours["corner"]) * 0.92 - out)
-    roots = np.zeros(len(skin.person.ground.at))
+    rooted = np.zeros(len(skin.person.ground.at))
     for lid in skin.lids:
         for row, share in zip((lid.lower, lid.upper), LASHES[::-1], strict=True):
-            roots[row[2:-1]] = share
-    roots = skin.field(roots)
+            rooted[row[2:-1]] = share
+    roots = skin.field(rooted)
     out += skin.float(roots * smooth(edge, 0.15, 0.6) * (1 - caruncle))[:, None] * (
         _vector(skin.recipe.colours["lashes"]) - out
     )
