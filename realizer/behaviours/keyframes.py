@@ -45,13 +45,13 @@ class Keys:
 
 def timing(node: FaceKeyframe, context: PlanningContext) -> Timing:
     """Return the duration from its first to its last key; it can stretch."""
-    times = _keys(node).times
+    times = keys_of(node).times
     return Timing(("start", "end"), times[-1:] - times[0], np.zeros(1), np.array([RECORDED]))
 
 
 def expand(node: FaceKeyframe, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     """Return channels through its keys from start to end, with eased beginning and end."""
-    keys = _keys(node)
+    keys = keys_of(node)
     first, last = keys.times[0], keys.times[-1]
     at = times[0] + (keys.times - first) * ((times[-1] - times[0]) / (last - first))
     channels = []
@@ -66,7 +66,7 @@ def expand(node: FaceKeyframe, times: Float64, context: PlanningContext) -> tupl
 def check(node: FaceKeyframe, context: PlanningContext) -> tuple[Fault, ...]:
     """Return faults: unreadable keys are fatal, a FAP out of range is not."""
     try:
-        keys = _keys(node)
+        keys = keys_of(node)
     except KeyframeError as error:
         return (Fault("CANNOT_CREATE_BEHAVIOR", str(error)),)
     least, most = keys.values.min(axis=0), keys.values.max(axis=0)
@@ -80,10 +80,11 @@ def check(node: FaceKeyframe, context: PlanningContext) -> tuple[Fault, ...]:
 
 def claims(node: FaceKeyframe, context: PlanningContext) -> frozenset[str]:
     """Return claims on its FAPs, which replace each other; AUs blend."""
-    return frozenset(f"FAP {part}" for part in _keys(node).parts if isinstance(part, int))
+    return frozenset(f"FAP {part}" for part in keys_of(node).parts if isinstance(part, int))
 
 
-def _keys(node: FaceKeyframe) -> Keys:
+def keys_of(node: FaceKeyframe) -> Keys:
+    """Return its keys; raises KeyframeError."""
     if node.type not in PART:
         raise KeyframeError(
             f"type: wanted FAPS or FACS, as faces are moved by parameters here, got {node.type}"

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from bml_schema import Timeline as Node
-from realizer.animation.axis import Target, mask_channel, mixing_order
-from realizer.animation.channel import Channel
+from realizer.animation.axis import Target, fap, mask_channel, mixing_order
+from realizer.animation.channel import Channel, Layer
 from realizer.behaviours import media, pose_channels
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext
 from realizer.core.array_types import Float64
-from realizer.expressions.timeline import Timeline, Track, duration_of, faults_of, remarks, spans
+from realizer.expressions.timeline import Span, Timeline, Track, duration_of, faults_of, remarks, spans
 from realizer.expressions.timeline_file import read_timeline
 from realizer.scheduling.timing import Timing
 
@@ -29,7 +30,10 @@ def timing(node: Node, context: PlanningContext) -> Timing:
 
 
 def expand(node: Node, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels of all tracks; of several values for one action unit the highest is visible."""
+    """Return channels of all tracks.
+
+    Of several values for one action unit the highest is visible; keyframes override all of them.
+    """
     timeline = _timeline(node, context)
     start, end = float(times[0]), float(times[-1])
     scale = (end - start) / duration_of(timeline, context.library)
@@ -79,7 +83,22 @@ def _channels(
         channels.append(
             Channel(target, times[keep], np.array([*values, 0.0])[keep], curve=track.curve, source=node.id)
         )
+    for span in shown:
+        channels += _keyframes(span, start, scale, node.id)
     return channels
+
+
+def _keyframes(span: Span, start: float, scale: float, source: str) -> Iterator[Channel]:
+    """Yield a channel for each FAP of keyframes, from the start of the entry to its end, and not eased."""
+    if not span.entry.is_keyframes:
+        return
+    keys = np.array(span.entry.keys)
+    times = start + (span.start + keys[:, 0] * ((span.end - span.start) / keys[-1, 0])) * scale
+    weight = np.ones(len(keys))
+    for number, values in zip(span.entry.faps, keys[:, 1:].T * span.entry.intensity, strict=True):
+        yield Channel(
+            fap(number), times, values, curve="linear", layer=Layer.FAPS, weight=weight, source=source
+        )
 
 
 def _mixing(timeline: Timeline, start: float, end: float, source: str) -> list[Channel]:

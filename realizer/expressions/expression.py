@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +89,7 @@ class Expression:
         }
 
 
+@lru_cache(maxsize=4096)
 def key(name: str) -> str:
     """Return the key of a name, which ignores case and separators."""
     return re.sub(r"[\s_-]+", "_", re.sub(r"\s*:\s*", ":", name.strip())).upper()

@@ -11,24 +11,31 @@ from realizer.expressions.library import Library
 Joins = Literal["both", "onset", "offset"]
 Curve = Literal["linear", "smooth"]
 Mixer = Literal["additive", "successive"]
-NEUTRAL = "NEUTRAL"
+NEUTRAL, KEYFRAMES = "NEUTRAL", "KEYFRAMES"
 
 
 @dataclass(frozen=True, slots=True)
 class Entry:
     """An entry of a track."""
 
-    expression: str  # name in the library; "neutral" is a break
+    expression: str  # name in the library; "neutral" is a break, "keyframes" plays `keys`
     intensity: float = 1.0  # 0..1
     # Seconds including onset and offset; None: the expression's own, or 0.5 s of a break.
     duration: float | None = None
-    onset: float | None = None  # seconds; None: the expression's own. A break has none.
-    offset: float | None = None  # seconds; None: the expression's own. A break has none.
+    onset: float | None = None  # seconds; None: the expression's own. Only expressions have one.
+    offset: float | None = None  # seconds; None: the expression's own. Only expressions have one.
     because: str | None = None  # the reason for it, for readers of the file
+    faps: tuple[int, ...] = ()  # FAPs of keyframes, 3..68; they override what action units give
+    # Seconds from the start of the keyframes and the value of each FAP in its FAPU; linear between two keys.
+    keys: tuple[tuple[float, ...], ...] = ()
 
     @property
-    def neutral(self) -> bool:
-        return key(self.expression) == NEUTRAL
+    def is_expression(self) -> bool:
+        return key(self.expression) not in (NEUTRAL, KEYFRAMES)
+
+    @property
+    def is_keyframes(self) -> bool:
+        return key(self.expression) == KEYFRAMES
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +67,7 @@ def faults_of(timeline: Timeline, library: Library) -> list[str]:
         f"channel {track.name}, entry {number}, expression: {library.unknown(entry.expression)}"
         for track in timeline.tracks
         for number, entry in enumerate(track.entries, 1)
-        if not entry.neutral and entry.expression not in library
+        if entry.is_expression and entry.expression not in library
     ]
 
 
@@ -119,9 +126,9 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
 
     An entry begins with its onset and ends with its offset. If `joins` is "onset" or "offset", only this one
     is used between two entries, and the other expression stays whole up to the border. The first entry
-    always has its onset and the last its offset. A break has neither: the entry before it ends with its
-    offset, and the entry after it begins with its onset. If an entry is too short, onset and offset are
-    scaled to fit.
+    always has its onset and the last its offset. A break has neither, nor have keyframes: the entry before
+    ends with its offset, and the entry after begins with its onset. If an entry is too short, onset and
+    offset are scaled to fit.
 
     Raises:
         KeyError: an expression that is not in the library.
@@ -129,7 +136,10 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
     begins, lengths = [track.start], []
     times = [_onset_and_offset(entry, library) for entry in track.entries]
     for entry, (onset, offset) in zip(track.entries, times, strict=True):
-        own = BREAK if entry.neutral else onset + library[entry.expression].apex + offset
+        if entry.is_expression:
+            own = onset + library[entry.expression].apex + offset
+        else:
+            own = entry.keys[-1][0] if entry.keys else BREAK
         lengths.append(own if entry.duration is None else entry.duration)
         begins.append(begins[-1] + lengths[-1])
     # Seconds of the transition after the begin of each entry, and before its end.
@@ -137,9 +147,9 @@ def spans(track: Track, library: Mapping[str, Expression]) -> list[Span]:
     for (one, (_, offset)), (other, (onset, _)) in pairwise(zip(track.entries, times, strict=True)):
         before, after = offset, onset
         if track.joins == "onset":
-            before, after = 0.0, offset if other.neutral else onset
+            before, after = 0.0, onset if other.is_expression else offset
         elif track.joins == "offset":
-            before, after = onset if one.neutral else offset, 0.0
+            before, after = offset if one.is_expression else onset, 0.0
         falls.append(before)
         rises.append(after)
     falls.append(times[-1][1])
@@ -157,7 +167,7 @@ def duration_of(timeline: Timeline, library: Mapping[str, Expression]) -> float:
 
 
 def visible_spans(timeline: Timeline, library: Mapping[str, Expression]) -> Iterator[VisibleSpan]:
-    """Yield the seconds for which each entry except breaks is visible.
+    """Yield the seconds for which each expression is visible.
 
     An expression is visible from the middle of the transition to it to the middle of the next one.
     """
@@ -166,14 +176,14 @@ def visible_spans(timeline: Timeline, library: Mapping[str, Expression]) -> Iter
         lefts = [shown[0].start, *(span.left for span in shown)]
         reached = [*(span.reached for span in shown), shown[-1].end]
         for k, span in enumerate(shown):
-            if not span.entry.neutral:
+            if span.entry.is_expression:
                 begin, end = (lefts[k] + span.reached) / 2, (span.left + reached[k + 1]) / 2
                 place, expression = f"channel {track.name}, entry {k + 1}", library[span.entry.expression]
                 yield VisibleSpan(place, expression, begin, end, number, k, span)
 
 
 def _onset_and_offset(entry: Entry, library: Mapping[str, Expression]) -> tuple[float, float]:
-    if entry.neutral:
+    if not entry.is_expression:
         return 0.0, 0.0
     expression = library[entry.expression]
     onset, offset = entry.onset, entry.offset

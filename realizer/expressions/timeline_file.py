@@ -3,7 +3,10 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast, get_args
+
+import numpy as np
 
 from realizer.core.errors import TableError
 from realizer.core.similar import did_you_mean, similar
@@ -14,7 +17,8 @@ from realizer.tables import action_units
 MIN_SECONDS, MAX_SECONDS = 0.04, 3600.0
 TIMELINE = ("mixer", "order", "channel")
 TRACK = ("name", "start", "joins", "curve", "entries")
-ENTRY = ("expression", "intensity", "duration", "onset", "offset", "because")
+ENTRY = ("expression", "intensity", "duration", "onset", "offset", "because", "faps", "keys")
+MAX_FAPU = 1e6
 
 
 def read_timeline(content: bytes) -> Timeline:
@@ -32,6 +36,7 @@ def read_timeline(content: bytes) -> Timeline:
             { expression = "template:surprise", intensity = 0.8, duration = 1.2 },
             { expression = "neutral", duration = 0.5 },
             { expression = "template:anger", onset = 0.2, offset = 0.6, because = "an exclamation" },
+            { expression = "keyframes", faps = [31, 32], keys = [[0, 0, 0], [0.5, 90, 80], [1, 0, 0]] },
         ]
 
     Raises:
@@ -145,7 +150,40 @@ class _TimelineReader:
             self._fault(f"{place}, because", "a text", because)
             because = None
         intensity = self._number(row, "intensity", 1.0, 0.0, 1.0, place)
-        return Entry(expression, intensity, duration, onset, offset, because)
+        entry = Entry(expression, intensity, duration, onset, offset, because)
+        if entry.is_keyframes:
+            return replace(entry, faps=self._faps(row.get("faps"), place), keys=self._keyframes(row, place))
+        for name in {"faps", "keys"} & {*row}:
+            self._fault(f"{place}, {name}", 'expression = "keyframes" beside it', expression)
+        return entry
+
+    def _faps(self, faps: Any, place: str) -> tuple[int, ...]:
+        known = isinstance(faps, list) and all(type(fap) is int and 3 <= fap <= 68 for fap in faps)
+        if known and 0 < len(faps) == len({*faps}):
+            return tuple(faps)
+        self._fault(f"{place}, faps", "FAPs 3..68, each once", faps)
+        return ()
+
+    def _keyframes(self, row: Mapping[str, Any], place: str) -> tuple[tuple[float, ...], ...]:
+        """Return rows of times that rise from 0 and of as many values as there are FAPs."""
+        keys, faps = row.get("keys"), row.get("faps")
+        width = 1 + (len(faps) if isinstance(faps, list) else 0)
+        try:
+            table = np.array(keys, np.float64)
+        except (ValueError, TypeError, OverflowError):
+            table = np.zeros(0)
+        if (
+            table.ndim == 2
+            and table.shape[0] >= 2
+            and table.shape[1] == width
+            and np.all(np.abs(table) <= MAX_FAPU)
+            and table[0, 0] == 0
+            and np.all(np.diff(table[:, 0]) > 0)
+        ):
+            return tuple(map(tuple, table.tolist()))
+        wanted = f"rows of a time, rising from 0, and {width - 1} numbers, at least two"
+        self._fault(f"{place}, keys", wanted, keys)
+        return ()
 
     def _choice(self, row: Mapping[str, Any], name: str, known: Sequence[str], place: str) -> str:
         value = row.get(name, known[0])
@@ -186,7 +224,7 @@ def timeline_json(timeline: Timeline) -> dict[str, Any]:
                 "entries": [
                     {
                         "expression": entry.expression,
-                        **_fields(entry, Entry(""), "intensity", "duration", "onset", "offset", "because"),
+                        **_fields(entry, Entry(""), *ENTRY[1:]),
                     }
                     for entry in track.entries
                 ],
@@ -203,6 +241,9 @@ def _fields(row: object, usual: object, *names: str) -> dict[str, Any]:
 
 
 def _value(value: Any) -> str:
+    if isinstance(value, tuple | list):
+        whole = (int(one) if isinstance(one, float) and one.is_integer() else one for one in value)
+        return f"[{', '.join(map(_value, whole))}]"
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{name} = {_value(one)}' for name, one in value.items())} }}"
     if isinstance(value, str):

@@ -50,6 +50,7 @@ class Mood:
     name: str
     distance: float  # average seconds from the end of one expression to the start of the next
     length: float  # average duration of expressions, relative to the usual one
+    like: str  # name of the observed mood that it equals, its own if it was observed
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,8 @@ def _company(row: Mapping[str, Any]) -> CompanionRule:
 def _moods(rows: Mapping[str, Any]) -> dict[str, Mood]:
     mean = float(rows["mean"])
     known = {name: row for name, row in rows.items() if name != "mean"}
-    values = {name: rows[row["like"]] if "like" in row else row for name, row in known.items()}
+    own = {name: row.get("like", name) for name, row in known.items()}
     return {
-        name: Mood(name, float(row["distance"]), float(row["frames"]) / mean) for name, row in values.items()
+        name: Mood(name, float(rows[like]["distance"]), float(rows[like]["frames"]) / mean, like)
+        for name, like in own.items()
     }

@@ -7,19 +7,33 @@ from pathlib import Path
 
 import numpy as np
 
-from bml_schema import Block, BMLError, Expression, FaceLexeme, Speech, SyncRef, read, write
+from bml_schema import (
+    Block,
+    BMLError,
+    Expression,
+    FaceInterpolator,
+    FaceKeyframe,
+    FaceLexeme,
+    Speech,
+    SyncRef,
+    read,
+    write,
+)
 from bml_schema.behaviours import SpeechText
 from bml_schema.node_schema import local
+from realizer.behaviours.keyframes import keys_of
 from realizer.behaviours.registry import VOCABULARY
+from realizer.core.array_types import Int16
 from realizer.core.errors import RealizerError, TableError
 from realizer.core.settings import Settings
 from realizer.enrichment import Enrichment
 from realizer.expressions.library import library_of
-from realizer.expressions.timeline import Entry, Timeline, Track, spans
+from realizer.expressions.timeline import Entry, Span, Timeline, Track, spans
 from realizer.expressions.timeline_file import MIN_SECONDS, read_timeline, timeline_json, write_timeline
 from realizer.knowledge.enrich import Enricher
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
+from realizer.outputs.wav import RATE
 from realizer.pipeline import plan, play
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
@@ -38,13 +52,14 @@ class Opened:
     """A timeline from a file or a text.
 
     Attributes:
-        words: (start, end, word) of the speech, in seconds.
-        peaks: largest amplitude of its sound, 0..1, in each hundredth of a second; [] without sound.
+        says: (start, text) of each speech, in seconds.
+        words: (start, end, word) of the speeches, in seconds.
+        peaks: largest amplitude of their sound, 0..1, in each hundredth of a second; [] without sound.
     """
 
     timeline: dict[str, object]
     left_out: list[str] = field(default_factory=list)  # what a timeline cannot hold, a sentence each
-    text: str = ""
+    says: list[tuple[float, str]] = field(default_factory=list)
     words: list[tuple[float, float, str]] = field(default_factory=list)
     peaks: list[float] = field(default_factory=list)
 
@@ -56,15 +71,15 @@ def open_file(text: str, settings: Settings) -> Opened:
         RealizerError: it is none of them; the text has a line for each fault.
     """
     if is_fap(text):
-        shown, left = fap_entries(text, list(library_of(settings.library_folder).values()))
-        return Opened(timeline_json(_lanes(shown)), left)
+        shown, kept, left = fap_entries(text, list(library_of(settings.library_folder).values()))
+        return Opened(timeline_json(Timeline((*_lanes(shown), *_lanes(kept, "FAPs ")))), left)
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         timeline = read_timeline(text.encode())
         unknown = [
             f"{entry.expression}: unknown here"
             for track in timeline.tracks
             for entry in track.entries
-            if not entry.neutral and entry.expression not in library_of(settings.library_folder)
+            if entry.is_expression and entry.expression not in library_of(settings.library_folder)
         ]
         return Opened(timeline_json(timeline), unknown)
     return _from_bml([text], settings)
@@ -86,7 +101,6 @@ def enrich_text(text: str, settings: Settings, mood: Mood | None = None, *, list
         found.left_out += notes
     else:
         found.left_out = notes
-    found.text = text
     return found
 
 
@@ -101,18 +115,20 @@ def _from_bml(documents: Sequence[str], settings: Settings) -> Opened:
     shown, left = list[tuple[float, Entry]](), [warning.text for warning in refused]
     for block, schedule in zip(blocks, schedules, strict=False):
         shown += _expressions(block, schedule, left)
-    found = Opened(timeline_json(_lanes(shown)), left)
+    keyed = [one for one in shown if one[1].is_keyframes]
+    named = [one for one in shown if one[1].is_expression]
+    found = Opened(timeline_json(Timeline((*_lanes(named), *_lanes(keyed, "FAPs ")))), left)
     for speech in player.speech():
         begin, said = speech.start, speech.utterance
         found.words += [(begin + word.start, begin + word.end, word.text) for word in said.words]
-        if said.pcm is not None and not found.peaks:
-            found.peaks = [0.0] * round(begin * PEAKS) + _peaks(said.pcm, said.sample_rate)
-    found.text = " ".join(
-        str(node.text)
-        for block in blocks
-        for node in block.behaviours
-        if isinstance(node, Speech) and node.text
-    )
+        if said.pcm is not None:
+            found.peaks += [0.0] * (round(begin * PEAKS) - len(found.peaks))
+            found.peaks += _peaks(said.pcm, said.sample_rate)
+    for block, schedule in zip(blocks, schedules, strict=False):
+        for node in block.behaviours:
+            if isinstance(node, Speech) and node.text and node.id in schedule.times:
+                start = schedule.start + float(schedule.times[node.id][0])
+                found.says.append((round(start, 3), str(node.text)))
     return found
 
 
@@ -143,6 +159,8 @@ def _expressions(block: Block, schedule: Schedule, left: list[str]) -> Iterable[
                     because,
                 ),
             )
+        elif isinstance(node, FaceKeyframe) and node.type == "FAPS":
+            yield _keyframes(node, schedule.start + float(times[0]), float(times[-1] - times[0]))
         elif not isinstance(node, Speech):
             left.append(f"{node.id}: a timeline holds expressions, got <{local(node.tag)}>")
 
@@ -153,8 +171,15 @@ def _shown(node: Expression | FaceLexeme) -> tuple[str, float, str | None]:
     return node.lexeme, node.amount, None
 
 
-def _lanes(shown: list[tuple[float, Entry]]) -> Timeline:
-    """Return a timeline of entries at these starts: each in the first channel that has room for it."""
+def _keyframes(node: FaceKeyframe, start: float, duration: float) -> tuple[float, Entry]:
+    keys = keys_of(node)
+    rows = np.column_stack([keys.times - keys.times[0], keys.values]).round(9).tolist()
+    faps = tuple(part for part in keys.parts if isinstance(part, int))
+    return start, Entry("keyframes", duration=round(duration, 3), faps=faps, keys=tuple(map(tuple, rows)))
+
+
+def _lanes(shown: list[tuple[float, Entry]], name: str = "") -> tuple[Track, ...]:
+    """Return channels of entries at these starts: each in the first channel that has room for it."""
     lanes: list[tuple[float, list[Entry], float]] = []  # start, entries, end
     for start, entry in sorted(shown, key=lambda one: one[0]):
         start, length = round(start, 3), entry.duration or 0.0
@@ -165,15 +190,39 @@ def _lanes(shown: list[tuple[float, Entry]]) -> Timeline:
                 break
         else:
             lanes.append((start, [entry], start + length))
-    tracks = (Track(str(k), tuple(row[1]), start=row[0]) for k, row in enumerate(lanes, 1))
-    return Timeline(tuple(tracks))
+    return tuple(Track(f"{name}{k}", tuple(row[1]), start=row[0]) for k, row in enumerate(lanes, 1))
 
 
-def export(timeline: Timeline, form: str, settings: Settings, speech: str | None = None) -> str:
+def sound(says: Sequence[tuple[float, str]], settings: Settings) -> Int16:
+    """Return speeches of (start, text) as (n,) int16 of `RATE`; (0,) if the voice is silent.
+
+    Raises:
+        ValueError: too much text.
+    """
+    if sum(len(text) for _, text in says) > MAX_TEXT:
+        raise ValueError(f"wanted at most {MAX_TEXT} characters")
+    block = Block(id="speech", children=_speeches(says))
+    heard = play([write(block)], settings.play_options(), settings.voice).sound(RATE)
+    return heard if heard.any() else heard[:0]
+
+
+def _speeches(says: Sequence[tuple[float, str]]) -> tuple[Speech, ...]:
+    return tuple(
+        Speech(
+            id=f"speech{number}",
+            text=SpeechText(parts=(text,)),
+            syncs={"start": SyncRef(offset=float(start))},
+        )
+        for number, (start, text) in enumerate(says, 1)
+        if text.strip()
+    )
+
+
+def export(timeline: Timeline, form: str, settings: Settings, says: Sequence[tuple[float, str]] = ()) -> str:
     """Return a timeline in another form: toml, json (the timeline), bml, or numbers: fap, csv.
 
     Args:
-        speech: a text that BML speaks from its start.
+        says: (start, text) of what BML speaks.
 
     Raises:
         ValueError: no such form.
@@ -181,7 +230,7 @@ def export(timeline: Timeline, form: str, settings: Settings, speech: str | None
     if form == "toml":
         return write_timeline(timeline)
     if form == "bml":
-        return write(_block(timeline, settings, speech))
+        return write(_block(timeline, settings, says))
     if form not in NUMBERS:
         raise ValueError(f"form: wanted one of toml, bml, {', '.join(NUMBERS)}, got {form[:80]!r}")
     with tempfile.TemporaryDirectory() as folder:
@@ -193,16 +242,15 @@ def export(timeline: Timeline, form: str, settings: Settings, speech: str | None
         return OUTPUTS[f".{form}"].encode(played, RenderSettings()).decode()
 
 
-def _block(timeline: Timeline, settings: Settings, speech: str | None) -> Block:
-    """Return a block with an expression for each entry; it loses curves, joins and the mixer."""
+def _block(timeline: Timeline, settings: Settings, says: Sequence[tuple[float, str]]) -> Block:
+    """Return a block with a behaviour for each entry; it loses curves, joins and the mixer."""
     library = library_of(settings.library_folder)
-    children: list[Speech | Expression] = []
-    if speech and speech.strip():
-        start = {"start": SyncRef(offset=0.0)}
-        children.append(Speech(id="speech1", text=SpeechText(parts=(speech,)), syncs=start))
+    children: list[Speech | Expression | FaceKeyframe] = [*_speeches(says)]
     for number, track in enumerate(timeline.tracks, 1):
         for k, span in enumerate(spans(track, library), 1):
-            if not span.entry.neutral:
+            if span.entry.is_keyframes:
+                children.append(_keyframe(f"channel{number}-{k}", span))
+            elif span.entry.is_expression:
                 times = (span.start, span.reached, span.left, span.end)
                 points = zip(("start", "attackPeak", "relax", "end"), times, strict=True)
                 syncs = {name: SyncRef(offset=round(time, 3)) for name, time in points}
@@ -217,3 +265,13 @@ def _block(timeline: Timeline, settings: Settings, speech: str | None) -> Block:
                     )
                 )
     return Block(id="timeline", children=tuple(children))
+
+
+def _keyframe(id: str, span: Span) -> FaceKeyframe:
+    rows = [(time, *(span.entry.intensity * value for value in row)) for time, *row in span.entry.keys]
+    keys = "\n".join(" ".join(f"{number:.12g}" for number in row) for row in rows)
+    syncs = {"start": SyncRef(offset=round(span.start, 3)), "end": SyncRef(offset=round(span.end, 3))}
+    parts = " ".join(map(str, span.entry.faps))
+    return FaceKeyframe(
+        id=id, type="FAPS", interpolator=FaceInterpolator(parts=parts, keys=f"\n{keys}\n"), syncs=syncs
+    )

@@ -1,12 +1,15 @@
-"""Expressions that the frames of a FAP file show, as entries of a timeline."""
+"""The frames of a FAP file as entries of a timeline: expressions, and keyframes that none of them shows."""
 
+import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from realizer.animation.axis import au_row
+from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import read_fap
+from realizer.behaviours.fap_visemes import expand_compound
 from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.corpus.find import runs
@@ -20,6 +23,7 @@ from realizer.tables import HEAD_COLUMNS
 
 FPS = 25.0
 MOST_FRAMES = 7500  # five minutes
+MOST_NUMBERS = 100_000  # of keyframes; the page sends them with every question
 MOST, WORTH = 10, 0.02  # expressions, and the least share of all squared movement that one more explains
 LEAST = 0.06  # intensity of an entry
 VALLEY = 0.6  # of the smaller of two peaks; what falls below between them is two entries
@@ -33,40 +37,73 @@ def is_fap(text: str) -> bool:
     return len(words) > 1 and all(re.fullmatch(r"[\d.+-]+", word) for word in (words[0], words[-1]))
 
 
-def fap_entries(text: str, library: Sequence[Expression]) -> tuple[list[tuple[float, Entry]], list[str]]:
-    """Return start and entry of each expression that a FAP file shows, and what they do not.
+def fap_entries(
+    text: str, library: Sequence[Expression]
+) -> tuple[list[tuple[float, Entry]], list[tuple[float, Entry]], list[str]]:
+    """Return start and entry of the expressions that a FAP file shows, of its keyframes, and notes.
 
     Expressions are chosen one after the other, each the one that explains most of what is left, with
     intensities by non-negative least squares in millimetres of the face; a peak of one becomes an entry.
+    A movement between two rests that expressions do not explain stays as it is, as keyframes; so do turns
+    of the head and visemes, the latter as the FAPs of their mouths.
 
     Raises:
         RealizerError: no FAP file, or one without frames or of more than five minutes.
     """
-    clip = read_fap(text)
-    left = list(clip.notes)
+    coded = read_fap(text)
+    clip = expand_compound(coded)
+    notes = list(clip.notes)
     if not len(clip.values):
         raise RealizerError("wanted frames of FAPs, a mask and values each, got none")
     if len(clip.values) / clip.fps * FPS > MOST_FRAMES:
         raise RealizerError(
             f"wanted FAPs of at most {MOST_FRAMES / FPS:.0f} s, got {len(clip.values) / clip.fps:.1f} s"
         )
-    clip = clip.resampled(FPS)
-    if clip.visemes[:, :3].any():
-        left.append("FAP 1: a timeline holds expressions, got visemes")
-    if clip.values[:, HEAD_COLUMNS].any():
-        left.append("FAP 48 to 50: a timeline holds expressions, got turns of the head")
+    if coded.visemes[:, :3].any():
+        notes.append("FAP 1: visemes are kept as the FAPs of their mouths")
+    slow = clip.resampled(FPS)
     shown = faps_of(np.stack([au_row(one.aus) for one in library])) * clip.mask
-    faces, shown = (features(Recording("", faps=faps)) for faps in (clip.values.astype(np.float64), shown))
+    faces, shown = (features(Recording("", faps=faps)) for faps in (slow.values.astype(np.float64), shown))
     chosen, weights = explain(faces, shown, MOST, WORTH)
+    rest, whole = (np.sum(rows**2, axis=1) for rows in (faces - weights @ shown[chosen], faces))
+    kept, columns = list[tuple[float, Entry]](), range(68)
+    for first, last in runs(np.any(clip.values, axis=1)):
+        low, high = (round(frame / clip.fps * FPS) for frame in (first, last))
+        explained = rest[low : high + 1].sum() <= WORTH * max(whole[low : high + 1].sum(), 1e-12)
+        if not explained:
+            weights[low : high + 1] = 0
+        if found := _keyframes(clip, first, last, columns[HEAD_COLUMNS] if explained else columns[2:]):
+            kept.append(found)
+    size = 0
+    for number, (start, entry) in enumerate(kept):
+        size += len(entry.keys) * (len(entry.faps) + 1)
+        if size > MOST_NUMBERS:
+            notes.append(f"keyframes from {start:.1f} s on: more than {MOST_NUMBERS} numbers")
+            del kept[number:]
+            break
     entries = [
         found for k, row in zip(chosen, weights.T, strict=True) for found in _entries(library[k].name, row)
     ]
-    rest = faces - weights @ shown[chosen]
-    if (share := float(np.sum(rest**2)) / max(float(np.sum(faces**2)), 1e-12)) > WORTH:
-        where = int(np.argmax(np.sum(rest**2, axis=1)))
-        most = int(np.argmax(np.abs(rest[where]))) + 1
-        left.append(f"{share:.0%} of the movement, most at {where / FPS:.1f} s in FAP {most}")
-    return entries, left
+    return entries, kept, notes
+
+
+def _keyframes(clip: FAPClip, first: int, last: int, columns: Iterable[int]) -> tuple[float, Entry] | None:
+    """Return the frames of a run, and the frame of rest on each side of it; None: these FAPs rest."""
+    moved = [column for column in columns if clip.values[first : last + 1, column].any()]
+    if not moved:
+        return None
+    first, last = max(first - 1, 0), min(last + 1, len(clip.values) - 1)
+    times, rows = np.arange(first, last + 1) / clip.fps, clip.values[first : last + 1, moved]
+    # Entries begin and end at whole milliseconds; there the frame at their border is held.
+    begin, end = math.floor(times[0] * 1000 + 1e-6) / 1000, math.ceil(times[-1] * 1000 - 1e-6) / 1000
+    times = np.round(times - begin, 9)
+    end = max(end, begin + MIN_SECONDS)
+    before, after = int(times[0] > 0), int(end - begin - times[-1] > 1e-7)
+    times = np.r_[[0.0] * before, times, [round(end - begin, 9)] * after]
+    rows = np.r_[rows[:1].repeat(before, axis=0), rows, rows[-1:].repeat(after, axis=0)]
+    keys = tuple((time, *row) for time, row in zip(times.tolist(), rows.tolist(), strict=True))
+    faps = tuple(column + 1 for column in moved)
+    return begin, Entry("keyframes", duration=keys[-1][0], faps=faps, keys=keys)
 
 
 def _entries(name: str, weights: Float64) -> list[tuple[float, Entry]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
@@ -13,7 +14,7 @@ from realizer.core.settings import Settings
 from realizer.expressions.expression import Expression
 from realizer.expressions.library import library_of
 from realizer.expressions.timeline import Timeline, faults_of
-from realizer.expressions.timeline_file import read_timeline
+from realizer.expressions.timeline_file import MAX_SECONDS, read_timeline
 
 if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
@@ -71,7 +72,8 @@ def _library(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
         known = [match for match, _ in by_action_units(units, known)]
     elif query:
         known = [match for match, _ in by_meaning(query, known)]
-    return {"expressions": [_row(expression) for expression in known], "moods": sorted(knowledge().moods)}
+    moods = sorted({mood.like for mood in knowledge().moods.values()})
+    return {"expressions": [_row(expression) for expression in known], "moods": moods}
 
 
 def _row(expression: Expression) -> dict[str, Any]:
@@ -105,7 +107,14 @@ def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
             [[s.start, s.reached, s.left, s.end] for s in spans(track, library)] for track in timeline.tracks
         ],
         "advice": [
-            {"place": places.get(one.id), "text": one.text, "hint": one.hint, "impossible": one.is_impossible}
+            {
+                "place": places.get(one.id),
+                "text": one.text,
+                "hint": one.hint.replace(
+                    "`realizer enrich` adds what is missing", "the dashed block adds it"
+                ),
+                "impossible": one.is_impossible,
+            }
             for one in advice
         ],
         "remarks": remarks(timeline),
@@ -154,9 +163,24 @@ def _enrich(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
 def _export(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     from realizer.server.design.documents import export
 
-    text = request.get("text")
     timeline = timeline_of(request, settings)
-    return {"text": export(timeline, str(request.get("form")), settings, None if text is None else str(text))}
+    return {"text": export(timeline, str(request.get("form")), settings, _says(request))}
+
+
+def _sound(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    """Return what is said as int16 in base64, and its rate in Hz."""
+    from realizer.outputs.wav import RATE
+    from realizer.server.design.documents import sound
+
+    heard = sound(_says(request), settings).astype("<i2").tobytes()
+    return {"rate": RATE, "data": b64encode(heard).decode()}
+
+
+def _says(request: Mapping[str, Any]) -> list[tuple[float, str]]:
+    says = [(float(start), str(text)) for start, text in request.get("says") or ()]
+    if not all(0 <= start <= MAX_SECONDS for start, _ in says):
+        raise ValueError(f"says: wanted starts of 0..{MAX_SECONDS:g} s")
+    return says
 
 
 TOOLS: Mapping[Any, Callable[[Mapping[str, Any], Settings], dict[str, Any]]] = {
@@ -166,4 +190,5 @@ TOOLS: Mapping[Any, Callable[[Mapping[str, Any], Settings], dict[str, Any]]] = {
     "open": _open,
     "enrich": _enrich,
     "export": _export,
+    "sound": _sound,
 }

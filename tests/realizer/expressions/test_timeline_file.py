@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 from hypothesis import given
@@ -133,3 +134,27 @@ def test_write_timeline_leaves_out_what_is_as_usual() -> None:
         '[[channel]]\nname = "brows"\nentries = [\n    { expression = "smile" },\n'
         '    { expression = "neutral", duration = 0.4 },\n]\n'
     )
+
+
+@pytest.mark.parametrize(
+    ("fields", "fault"),
+    [
+        ("faps = [31, 31], keys = [[0, 1, 1], [1, 0, 0]]", "faps: wanted FAPs 3..68, each once"),
+        ("faps = [2], keys = [[0, 1], [1, 0]]", "faps: wanted FAPs 3..68"),
+        (
+            "faps = [31]",
+            "keys: wanted rows of a time, rising from 0, and 1 numbers, at least two, got nothing",
+        ),
+        ("faps = [31], keys = [[0, 1], [0, 2]]", "rising from 0"),
+        ("faps = [31], keys = [[0, 1], [1, 2, 3]]", "and 1 numbers"),
+        ("faps = [31], keys = [[0, 1], [1, 1e9]]", "and 1 numbers"),
+    ],
+)
+def test_read_timeline_says_what_is_wrong_with_keyframes(fields: str, fault: str) -> None:
+    with pytest.raises(TableError, match=re.escape(fault)):
+        read_timeline(f'[[channel]]\nentries = [{{ expression = "keyframes", {fields} }}]'.encode())
+
+
+def test_read_timeline_wants_keys_only_in_keyframes() -> None:
+    with pytest.raises(TableError, match=r"faps: wanted expression = .keyframes. beside it, got 'smile'"):
+        read_timeline(b'[[channel]]\nentries = [{ expression = "smile", faps = [31] }]')

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -13,7 +14,8 @@ from realizer.core.errors import TableError
 from realizer.core.settings import Settings
 from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_file import read_timeline, timeline_json, write_timeline
-from realizer.server.design.documents import enrich_text, export, open_file
+from realizer.outputs.wav import RATE
+from realizer.server.design.documents import enrich_text, export, open_file, sound
 
 SETTINGS = Settings(voice="silent")
 TIMELINE = Timeline(
@@ -55,12 +57,13 @@ def test_open_file_keeps_an_unknown_expression_and_says_so() -> None:
 
 
 def test_open_file_reads_expressions_of_bml_and_says_what_is_left_out() -> None:
-    bml = export(TIMELINE, "bml", SETTINGS, "Hello there.").replace(
+    bml = export(TIMELINE, "bml", SETTINGS, [(0.5, "Hello there.")]).replace(
         "</bml>", '<head id="h" lexeme="NOD"/><faceLexeme id="f" lexeme="SMILE" start="6" end="8"/></bml>'
     )
     opened = open_file(bml, SETTINGS)
     assert opened.left_out == ["h: a timeline holds expressions, got <head>"]
-    assert opened.text.strip() == "Hello there."
+    assert opened.says == [(0.5, "Hello there.")]
+    assert opened.words[0][0] == pytest.approx(0.5, abs=0.1)
     assert [word for _, _, word in opened.words] == ["Hello", "there"]
     first, second = read(opened).tracks
     assert [entry.expression for entry in first.entries] == [
@@ -80,7 +83,7 @@ def test_open_file_refuses_what_is_neither() -> None:
 
 def test_enrich_text_fills_lanes_with_reasons() -> None:
     opened = enrich_text("Are you sure? That is nonsense!", SETTINGS)
-    entries = [entry for track in read(opened).tracks for entry in track.entries if not entry.neutral]
+    entries = [entry for track in read(opened).tracks for entry in track.entries if entry.is_expression]
     assert {entry.expression for entry in entries} == {"template:surprise", "template:anger"}
     assert all(entry.because and "Wojdel" in entry.because for entry in entries)
     assert opened.words[0][2] == "Are"
@@ -91,3 +94,16 @@ def test_enrich_text_fills_lanes_with_reasons() -> None:
 def test_enrich_text_shows_a_listener() -> None:
     opened = enrich_text("It is terrible!", SETTINGS, listener=True)
     assert "template:astonishment" in {entry.expression for t in read(opened).tracks for entry in t.entries}
+
+
+def test_sound_has_each_speech_at_its_start() -> None:
+    settings = Settings(voice="espeak")
+    heard = sound([(0.0, "Hello."), (3.0, "There.")], settings)
+    alone = sound([(0.0, "Hello.")], settings)
+    assert np.array_equal(heard[: len(alone)], alone)
+    assert not heard[len(alone) : round(2.99 * RATE)].any()
+    assert heard[round(2.99 * RATE) :].any()
+
+
+def test_sound_of_a_silent_voice_is_empty() -> None:
+    assert len(sound([(0.0, "Hello.")], SETTINGS)) == 0

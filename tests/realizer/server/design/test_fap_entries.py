@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,10 +18,11 @@ from realizer.corpus.learn import features
 from realizer.corpus.recording import Recording
 from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track
-from realizer.expressions.timeline_file import read_timeline
+from realizer.expressions.timeline_file import read_timeline, write_timeline
 from realizer.outputs.fap_text import encode
 from realizer.server.design.documents import export, open_file
 from realizer.server.design.fap_entries import fap_entries, is_fap
+from realizer.tables import faps
 
 SETTINGS = Settings(voice="silent")
 LIBRARY = list(builtin().values())
@@ -39,12 +41,19 @@ def text() -> str:
     return export(TIMELINE, "fap", SETTINGS)
 
 
+def faps_of(timeline: Timeline, fps: float, count: int) -> np.ndarray:
+    """What the timeline plays on a face without idle motion, (count, 68) integers."""
+    settings = replace(SETTINGS, idle=False, fps=fps)
+    values = read_fap(export(timeline, "fap", settings)).values
+    return np.concatenate([values, np.zeros((count, 68), np.int32)])[:count]
+
+
 def millimetres(text: str) -> np.ndarray:
     return features(Recording("", faps=read_fap(text).values.astype(np.float64)))
 
 
 def test_fap_entries_are_those_of_the_timeline_that_was_saved(text: str) -> None:
-    entries, _ = fap_entries(text, LIBRARY)
+    entries, _, _ = fap_entries(text, LIBRARY)
     found = {entry.expression: (start, entry) for start, entry in entries if entry.intensity > 0.3}
     assert {*found} == {"RAISE_BROWS", "SMILE", "LOWER_MOUTH_CORNERS"}
     start, brows = found["RAISE_BROWS"]
@@ -63,24 +72,45 @@ def test_fap_file_opened_and_saved_moves_the_same(text: str) -> None:
     assert np.sum((before[:count] - again[:count]) ** 2) < 0.03 * np.sum(before**2)
 
 
-def test_fap_entries_say_what_a_timeline_cannot_hold() -> None:
+@pytest.mark.parametrize("fps", [25.0, 30.0])
+def test_fap_file_that_no_expression_resembles_is_kept_to_the_bit(fps: float) -> None:
+    low, high = (np.array([getattr(row, name) for row in faps()]) for name in ("least", "most"))
+    chance = np.random.default_rng(1)
+    values = chance.integers(np.maximum(low, -300), np.minimum(high, 300) + 1, (80, 68)).astype(np.int32)
+    values[:7] = values[30:41] = values[:, :2] = 0
+    mask = np.arange(68) > 1
+    clip = FAPClip("odd", fps, values, mask, np.zeros((80, 4), np.int32), np.zeros((80, 6), np.int32))
+    opened = open_file(encode(clip), SETTINGS)
+    assert opened.left_out == []
+    timeline = read_timeline(json.dumps(opened.timeline).encode())
+    assert read_timeline(write_timeline(timeline).encode()) == timeline
+    played = faps_of(timeline, fps, 80)
+    assert np.array_equal(played, values)
+    again = open_file(export(timeline, "bml", SETTINGS), SETTINGS)
+    reread = read_timeline(json.dumps(again.timeline).encode())
+    first, second = ([one.keys for one in file.tracks[0].entries] for file in (timeline, reread))
+    assert first == second
+
+
+def test_fap_entries_keep_visemes_and_turns_of_the_head_as_keyframes() -> None:
     values = np.zeros((50, 68), np.int32)
-    values[:, 49] = 2000  # the head turns
-    values[10:40, 16] = 900  # the upper lip alone goes out on one side, which no expression does
+    values[10:40, 49] = 2000  # the head turns
     visemes = np.zeros((50, 4), np.int32)
-    visemes[5:9, 0] = 3
-    mask = np.ones(68, bool)
+    visemes[15:19] = 3, 0, 63, 0
+    mask = np.isin(np.arange(68), [0, 49])
     clip = FAPClip("odd", 25.0, values, mask, visemes, np.zeros((50, 6), np.int32))
-    _, left = fap_entries(encode(clip), LIBRARY)
-    assert any("visemes" in one for one in left)
-    assert any("turns of the head" in one for one in left)
-    assert any(one.endswith("in FAP 17") for one in left), left
+    entries, [(start, kept)], notes = fap_entries(encode(clip), LIBRARY)
+    assert entries == []
+    assert (start, kept.duration) == (0.36, 1.24)
+    assert 50 in kept.faps
+    assert len(kept.faps) > 3
+    assert any("visemes" in one for one in notes)
 
 
 def test_fap_entries_split_peaks_with_a_valley_between() -> None:
     smile = Entry("SMILE", 0.9, 1.0, 0.3, 0.3)
     twice = Timeline((Track("a", (smile, Entry("neutral", duration=0.04), smile)),))
-    entries, _ = fap_entries(export(twice, "fap", SETTINGS), LIBRARY)
+    entries, _, _ = fap_entries(export(twice, "fap", SETTINGS), LIBRARY)
     assert len([entry for _, entry in entries if entry.expression == "SMILE" and entry.intensity > 0.5]) == 2
 
 

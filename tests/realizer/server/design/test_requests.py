@@ -63,6 +63,8 @@ def test_answer_considers_role_and_mood() -> None:
         ({"tool": "enrich", "text": " "}, "wanted a text"),
         ({"tool": "enrich", "text": "x" * 9000}, "wanted at most 5000 characters"),
         ({"tool": "open", "text": "<bml"}, "wanted <bml>"),
+        ({"tool": "sound", "says": [[0, "x" * 9000]]}, "wanted at most 5000 characters"),
+        ({"tool": "sound", "says": [[-1, "x"]]}, "wanted starts of 0..3600 s"),
         ({"tool": "library", "find": "AU99"}, "wanted an action unit"),
     ],
 )
