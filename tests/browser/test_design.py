@@ -11,8 +11,10 @@ from http.client import HTTPException
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from realizer.animation.fap.fap_reader import read_fap
 from realizer.expressions.library import builtin
 from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_file import read_timeline, write_timeline
@@ -420,6 +422,69 @@ def test_design_saves_files_that_come_back_with_every_field(page, tmp_path) -> N
     page.set_input_files("#design-file", tmp_path / "t.fap")
     page.wait_for_function(f"{SPANS}.flat(2).includes('RAISE_BROWS')")
     assert {"RAISE_BROWS", "SMILE"} <= {name for lane in spans(page) for name, *_ in lane}
+
+
+def test_design_keeps_keyframes_of_faps_that_no_expression_shows(page, tmp_path) -> None:  # type: ignore[no-untyped-def]
+    rows = np.random.default_rng(1).integers(-300, 300, (40, 3))
+    rows[:5] = rows[-5:] = 0
+    lines = [f"{' '.join(str(int(k in (17, 40, 53))) for k in range(1, 69))}"] * 40
+    text = "2.1 odd 25 40\n" + "".join(
+        f"{mask}\n{k} {' '.join(map(str, row))}\n"
+        for k, (mask, row) in enumerate(zip(lines, rows, strict=True))
+    )
+    (tmp_path / "odd.fap").write_text(text, "utf-8")
+    page.set_input_files("#design-file", tmp_path / "odd.fap")
+    page.wait_for_selector(".d-block.keys")
+    assert page.inner_text(".d-block.keys > span") == "FAP 17, 40, 53"
+    assert page.locator("#design-inspector [aria-label='Onset, seconds']").count() == 0
+    played = read_fap(saved(page, "fap"))
+    assert np.array_equal(played.values[:36, [16, 39, 52]], rows[:36])
+    file = read_timeline(saved(page, "toml").encode())
+    (tmp_path / "odd.toml").write_text(write_timeline(file), "utf-8")
+    drag(page, ".d-block.keys", scale(page) * 0.5)
+    page.wait_for_function(f"Math.abs({FIRST} - 0.66) < 0.05")
+    page.set_input_files("#design-file", tmp_path / "odd.toml")
+    page.wait_for_function(f"{FIRST} < 0.2")
+    assert read_timeline(saved(page, "toml").encode()) == file
+    assert "FaceInterpolator" in saved(page, "bml")
+
+
+def test_design_is_heard_in_step_with_the_picture(browser) -> None:  # type: ignore[no-untyped-def]
+    with serving([sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle"]) as address:
+        page = browser.new_page(viewport={"width": 1280, "height": 900}, bypass_csp=True)
+        page.set_default_timeout(PATIENCE)
+        page.goto(f"{address}#design")
+        page.wait_for_selector(".d-card")
+        page.fill("#design-text", "Are you sure? That is nonsense!")
+        page.click("text=Fill lanes")
+        page.wait_for_function("realizerPage.design.voice.buffer")
+        ends = page.evaluate("realizerPage.design.model.speech.words.at(-1)[1]")
+        assert page.evaluate("realizerPage.design.voice.duration") == pytest.approx(ends, abs=0.5)
+        page.click("#design-play")
+        page.wait_for_function("realizerPage.design.voice.time > 0.3")
+        assert page.inner_text("#sound").strip() == "Sound on"
+        apart = page.evaluate(
+            "({ preview, voice } = realizerPage.design) => (preview.now(), preview.time - voice.time)"
+        )
+        assert abs(apart) < 0.02
+        page.click("#design-play")
+        assert page.evaluate("realizerPage.design.voice.source") is None
+        page.focus(".d-ruler")
+        page.keyboard.press("ArrowRight")
+        assert page.evaluate("realizerPage.design.voice.source !== null")
+        page.click("#sound")
+        page.click("#design-play")
+        page.wait_for_function("realizerPage.design.preview.time > 0.2")
+        page.close()
+
+
+def test_design_films_the_timeline(page) -> None:  # type: ignore[no-untyped-def]
+    add(page, "surprise")
+    with page.expect_download() as download:
+        page.select_option("#design-form", "film")
+    assert re.fullmatch(r"face\.(webm|mp4)", download.value.suggested_filename)
+    assert Path(download.value.path()).stat().st_size > 1000
+    assert page.evaluate("realizerPage.design.preview.loop")
 
 
 def test_design_edits_an_expression_and_saves_it_to_the_library(page, edits) -> None:  # type: ignore[no-untyped-def]

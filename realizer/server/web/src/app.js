@@ -39,7 +39,7 @@ const units = new ActionUnits(at("au-sliders"), at("find-aus"), pose);
 const params = new Faps(at("fap-sliders"), at("find-faps"), pose);
 const mirror = new Mirror(link, (message) => log.error(message));
 const room = new FaceRoom();
-const design = new DesignTab(link, stage);
+const design = new DesignTab(link, stage, { sound, recorder, hear, film });
 const label = new LabelTab(async (find) => (await design.ask({ tool: "library", find })).expressions);
 const wheel = new Wheel(at("wheel"), pose, (message) => log.error(message));
 
@@ -194,8 +194,7 @@ function draw() {
 
 function play(replace) {
   if (at("play").disabled) return;
-  sound.start();
-  showSound();
+  hear();
   timeline.look(null);
   const text = editor.text;
   const id = text.match(BLOCK)?.[3];
@@ -281,16 +280,20 @@ function showSound() {
   at("sound").ariaPressed = String(sound.on);
   at("sound").lastElementChild.textContent = sound.on ? "Sound on" : "Sound off";
 }
+function hear() {
+  sound.start();
+  showSound();
+}
 at("sound").onclick = () => {
-  sound.on ? sound.mute() : sound.start();
+  sound.on ? sound.mute() : hear();
   showSound();
 };
 
-at("record").hidden = typeof MediaRecorder === "undefined";
-at("record").onclick = async () => {
-  if (!recorder.on) {
-    sound.start();
-    showSound();
+// Begin a film, or end it and save it.
+async function film(on) {
+  if (on === recorder.on) return;
+  if (on) {
+    hear();
     recorder.start();
   } else {
     const { blob, suffix } = await recorder.stop();
@@ -298,7 +301,9 @@ at("record").onclick = async () => {
     at("record").lastElementChild.textContent = "Record";
   }
   at("record").ariaPressed = String(recorder.on);
-};
+}
+at("record").hidden = typeof MediaRecorder === "undefined";
+at("record").onclick = () => film(!recorder.on);
 
 // the pose ------------------------------------------------------------------------------------
 

@@ -53,7 +53,7 @@ export class Editor {
           this.completion.of([]),
           linter(lint, { delay: PAUSE, needsRefresh: null }),
           tooltips({ parent: document.body }),
-          EditorView.contentAttributes.of({ id: "document", "aria-label": "BML document", spellcheck: "false", autocapitalize: "off" }),
+          EditorView.contentAttributes.of({ id: "document", "aria-label": "BML document", tabindex: "0", spellcheck: "false", autocapitalize: "off" }),
           keymap.of([...closeBracketsKeymap, ...defaultKeymap.filter(({ key }) => key !== "Mod-Enter"), ...searchKeymap, ...historyKeymap, ...foldKeymap, ...completionKeymap, ...lintKeymap, indentWithTab]),
         ],
       }),

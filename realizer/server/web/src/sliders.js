@@ -18,7 +18,7 @@ class Sliders {
       ...groups.map(({ name, members }) => {
         const rows = members.map(rowOf).filter(Boolean);
         this.rows.push(...rows);
-        return make("fieldset.group", {}, this.heading(name), ...rows.map((row) => row.element));
+        return make("fieldset.group", {}, this.heading(name, rows), ...rows.map((row) => row.element));
       }),
     );
     this.refresh();
@@ -67,7 +67,8 @@ export class ActionUnits extends Sliders {
     this.fill(groups.aus, (number) => known.has(number) && this.row(known.get(number)));
   }
 
-  heading(name) {
+  heading(name, rows) {
+    if (rows.every(({ element }) => element.classList.contains("middle"))) return super.heading(name);
     return make("legend.sides", {}, make("span", {}, name), make("span.side", {}, "right"), make("span.side", {}, "left"));
   }
 

@@ -64,7 +64,7 @@ export class Expression {
       const version = file === this.file ? this.version : null;
       const answer = await this.save({ type: "save", kind: "expression", name: file, content: this.toml, ...(version ? { version } : {}) });
       Object.assign(this, { file, version: answer.version });
-      this.told(`Saved as ${answer.file}.`);
+      this.told(`Saved as ${answer.file}; ${name} is now in the library.`);
       this.saved(name);
     } catch (error) {
       this.told(error.message);

@@ -22,7 +22,7 @@ export class Gestures {
     if (!block || event.button) return;
     const { design } = this;
     const part = event.target.dataset.part ?? "body";
-    const began = { x: event.clientX, y: event.clientY, entry: block.entry, span: design.span(block.entry), lane: design.find(block.entry)[0] };
+    const began = { edges: this.edges(), x: event.clientX, y: event.clientY, entry: block.entry, span: design.span(block.entry), lane: design.find(block.entry)[0] };
     let { entry } = began;
     let moved = false;
     design.select(entry);
@@ -53,13 +53,14 @@ export class Gestures {
   }
 
   // A step of a drag, from the state at its begin; return the entry.
-  drag(part, { span, lane, entry: first, y }, entry, by, { clientX, clientY, altKey, shiftKey }) {
+  drag(part, { edges, span, lane, entry: first, y }, entry, by, { clientY, altKey, shiftKey }) {
     const { design } = this;
     const snap = (time) => (shiftKey ? time : this.snapped(time, entry));
     design.preview = null;
     const reset = design.find(first) ? first : entry;
     if (part === "body") {
-      const over = this.at(clientX, clientY)?.lane ?? lane;
+      const at = this.laneAt(clientY, edges);
+      const over = at < 0 ? lane : Math.min(at, design.shown.channel.length - 1);
       const free = [snap(span.start + by), snap(span.end + by) - (span.end - span.start)];
       const start = Math.abs(free[0] - span.start - by) > 1e-9 ? free[0] : free[1];
       return design.place(reset, over, ms(start), false);

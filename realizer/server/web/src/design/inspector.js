@@ -1,6 +1,6 @@
 // The fields of the chosen block, of its channel, and of the whole timeline.
 import { at, make } from "../dom.js";
-import { ms, titleOf } from "./model.js";
+import { isKeys, ms, titleOf } from "./model.js";
 
 const WHOLE = { joins: ["both", "onset", "offset"], curve: ["linear", "smooth"], mixer: ["additive", "successive"] };
 
@@ -35,13 +35,12 @@ export class Inspector {
       make("div.d-fields", {},
         number("Start", start, 0, (value) => design.place(entry, lane, value)),
         number("Length", end - start, 0.04, (value) => this.lanes.resize(entry, value, false, null)),
-        number("Onset", onset, 0.04, set("onset")),
-        number("Offset", offset, 0.04, set("offset")),
+        ...(isKeys(entry) ? [] : [number("Onset", onset, 0.04, set("onset")), number("Offset", offset, 0.04, set("offset"))]),
         number("Amount", entry.intensity ?? 1, 0, set("intensity"), 1),
       ),
       ...advice.map(({ text, hint, impossible }) => make(`p.d-says${impossible ? ".bad" : ""}`, {}, `${text}; ${hint}`)),
       ...(entry.because ? [make("p.hint", {}, `because ${entry.because}`)] : []),
-      ...(row ? [] : [make("p.d-says.bad", {}, `There is no expression ${entry.expression}; the timeline is not played with it.`)]),
+      ...(isKeys(entry) ? [make("p.hint", {}, `${entry.keys.length} keyframes, which override what expressions give these FAPs.`)] : row ? [] : [make("p.d-says.bad", {}, `There is no expression ${entry.expression}; the timeline is not played with it.`)]),
       make("div.d-row", {}, press("Duplicate", () => design.duplicate(entry)), press("Delete", () => design.remove(entry)), ...(row ? [press("Action units", () => this.edit(row))] : [])),
     ];
   }

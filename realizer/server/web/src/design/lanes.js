@@ -1,7 +1,7 @@
 // The lanes of the designer: blocks with handles, by mouse, touch and keyboard; words and sound of a speech above.
 import { make } from "../dom.js";
 import { Gestures } from "./gestures.js";
-import { isBreak, ms, titleOf } from "./model.js";
+import { isBreak, isKeys, ms, titleOf } from "./model.js";
 
 const HANDLES = { start: "start", onset: "end of the onset", offset: "begin of the offset", end: "end", amount: "amount" };
 
@@ -63,7 +63,13 @@ export class Lanes extends Gestures {
     const rows = channel.map((one, lane) => {
       const known = this.drawn[lane];
       if (known?.channel === one && known.rows === this.design.rows) return known;
-      return { channel: one, rows: this.design.rows, element: this.laneOf(one, lane) };
+      const blocks = this.design.spans(one).filter(({ entry }) => !isBreak(entry));
+      // Most blocks of a lane stay what they are during a drag.
+      if (known?.rows === this.design.rows && known.channel.name === one.name && known.channel.own === one.own && blocks.length === known.blocks.length) {
+        blocks.forEach((span, k) => this.shape(known.blocks[k], span));
+        return Object.assign(known, { channel: one });
+      }
+      return { channel: one, rows: this.design.rows, ...this.laneOf(one, lane, blocks) };
     });
     const held = document.activeElement?.entry;
     if (rows.length !== this.drawn.length) this.lanes.replaceChildren(...rows.map(({ element }) => element));
@@ -74,29 +80,43 @@ export class Lanes extends Gestures {
     if (held && !this.dragging) this.focus(this.design.selected);
   }
 
-  laneOf(channel, lane) {
-    const blocks = this.design.spans(channel).filter(({ entry }) => !isBreak(entry)).map((span) => this.blockOf(span));
+  laneOf(channel, lane, spans) {
+    const blocks = spans.map((span) => this.shape(this.block(), span));
     const words = { role: "listbox", ariaLabel: `Channel ${channel.name}`, ariaOrientation: "horizontal" };
-    const list = make("div.d-list", blocks.length ? words : {}, ...blocks);
+    const empty = make("p.d-empty", {}, "Click an expression, or drag it here. In a gap the face is neutral.");
+    const list = make("div.d-list", blocks.length ? words : {}, ...(blocks.length ? blocks : [empty]));
     const name = make("button.d-name", { type: "button", title: "New blocks go to this channel" }, channel.name);
     name.onclick = () => {
       this.design.lane = lane;
       this.design.select(null);
     };
-    return make("div.d-lane", {}, name, make("div.d-track", {}, list));
+    return { list, blocks, element: make("div.d-lane", {}, name, make("div.d-track", {}, list)) };
   }
 
-  blockOf({ entry, start, reached, left, end }) {
-    const block = Object.assign(make("div.d-block", { role: "option", tabIndex: -1 }), { entry });
+  block() {
     const parts = Object.keys(HANDLES).map((part) => make(`i.d-handle.d-${part}`, { title: HANDLES[part] }));
     for (const [k, part] of Object.keys(HANDLES).entries()) parts[k].dataset.part = part;
+    return make("div.d-block", { role: "option", tabIndex: -1 }, make("i.d-shape"), make("span"), ...parts);
+  }
+
+  // Make a block show an entry at its times; return it.
+  shape(block, span) {
+    const { entry, start, reached, left, end } = span;
+    const old = block.span;
+    block.span = span;
+    if (old?.entry === entry && old.start === start && old.reached === reached && old.left === left && old.end === end) return block;
     const amount = entry.intensity ?? 1;
-    const shape = make("i.d-shape");
+    if (old?.entry !== entry) {
+      Object.assign(block, { entry, known: null });
+      block.classList.toggle("keys", isKeys(entry));
+      block.children[1].textContent = titleOf(entry);
+    }
     const across = (time) => `${((100 * (time - start)) / (end - start)).toFixed(2)}%`;
-    shape.style.clipPath = `polygon(0 100%, ${across(reached)} ${100 - 100 * amount}%, ${across(left)} ${100 - 100 * amount}%, 100% 100%)`;
-    block.append(shape, make("span", {}, titleOf(entry)), ...parts);
+    const tops = isKeys(entry) ? movement(entry, amount) : `${across(reached)} ${100 - 100 * amount}%, ${across(left)} ${100 - 100 * amount}%`;
+    block.children[0].style.clipPath = `polygon(0 100%, ${tops}, 100% 100%)`;
     for (const [name, value] of Object.entries({ "--at": ms(start), "--long": ms(end - start), "--amount": amount, "--reached": across(reached), "--left": across(left) })) block.style.setProperty(name, value);
-    block.dataset.lasts = `${titleOf(entry)}, ${start.toFixed(2)} to ${end.toFixed(2)} s, amount ${Math.round(100 * amount)} %`;
+    block.lasts = `${titleOf(entry)}, ${start.toFixed(2)} to ${end.toFixed(2)} s, amount ${Math.round(100 * amount)} %`;
+    block.known = null;
     return block;
   }
 
@@ -108,14 +128,15 @@ export class Lanes extends Gestures {
     for (const block of all) {
       const { entry } = block;
       const advice = this.marks.get(entry) ?? NONE;
-      block.tabIndex = block === stop ? 0 : -1;
+      if ((block.tabIndex === 0) !== (block === stop)) block.tabIndex = block === stop ? 0 : -1;
       if (block.known?.advice === advice && block.known.chosen === (entry === design.selected)) continue;
       block.known = { advice, chosen: entry === design.selected };
       block.ariaSelected = String(entry === design.selected);
-      block.dataset.state = !design.row(entry) ? "unknown" : advice.some(({ impossible }) => impossible) ? "impossible" : advice.length ? "unusual" : "";
-      const words = [...(design.row(entry) ? [] : ["no such expression"]), ...advice.map(({ text, hint }) => `${text}; ${hint}`), entry.because ?? ""].filter(Boolean).join(". ");
+      const known = design.row(entry) || isKeys(entry);
+      block.dataset.state = !known ? "unknown" : advice.some(({ impossible }) => impossible) ? "impossible" : advice.length ? "unusual" : "";
+      const words = [...(known ? [] : ["no such expression"]), ...advice.map(({ text, hint }) => `${text}; ${hint}`), entry.because ?? ""].filter(Boolean).join(". ");
       block.title = words;
-      block.ariaLabel = [block.dataset.lasts, words].filter(Boolean).join(". ");
+      block.ariaLabel = [block.lasts, words].filter(Boolean).join(". ");
     }
     [...this.lanes.querySelectorAll(".d-lane")].forEach((row, k) => row.classList.toggle("here", k === design.lane));
   }
@@ -153,10 +174,19 @@ export class Lanes extends Gestures {
 
   // The time and the number of the lane at a place on the screen; null outside.
   at(x, y) {
-    const track = document.elementsFromPoint(x, y).find((element) => element.closest?.(".d-lane") && this.panel.contains(element))?.closest(".d-lane");
-    if (!track) return null;
-    const lane = [...this.lanes.children].indexOf(track);
-    return { lane: Math.min(lane, this.design.shown.channel.length - 1), time: Math.max(0, this.timeAt(x)) };
+    const { left, right, top, bottom } = this.panel.getBoundingClientRect();
+    const lane = this.laneAt(y);
+    const inside = x >= left && x <= right && y >= top && y <= bottom && lane >= 0;
+    return inside ? { lane: Math.min(lane, this.design.shown.channel.length - 1), time: Math.max(0, this.timeAt(x)) } : null;
+  }
+
+  // The number of the lane at a height; -1: none. During a drag `edges` has where they were at its begin.
+  laneAt(y, edges = this.edges()) {
+    return edges.findIndex(([top, bottom]) => y >= top && y < bottom);
+  }
+
+  edges() {
+    return [...this.lanes.children].map((lane) => lane.getBoundingClientRect()).map(({ top, bottom }) => [top, bottom]);
   }
 
   timeAt(x) {
@@ -205,4 +235,12 @@ export class Lanes extends Gestures {
     this.head.style.setProperty("--at", time);
     for (const [name, value] of Object.entries({ valuemin: 0, valuemax: this.reach, valuenow: time })) this.ruler.setAttribute(`aria-${name}`, value.toFixed(2));
   }
+}
+
+// The outline of keyframes: how far their FAPs are from rest, beside the most, at up to 60 keys.
+function movement({ keys }, amount) {
+  const some = keys.filter((_, k) => k % Math.ceil(keys.length / 60) === 0);
+  const sizes = some.map(([, ...values]) => Math.hypot(...values));
+  const most = Math.max(...sizes) || 1;
+  return some.map(([time], k) => `${((100 * time) / keys.at(-1)[0]).toFixed(1)}% ${(100 - (100 * amount * sizes[k]) / most).toFixed(1)}%`).join(", ");
 }

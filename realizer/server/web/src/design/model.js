@@ -5,9 +5,12 @@ const BREAK = 0.5; // s, the usual break
 const DRAFT = "design"; // in localStorage
 
 export const ms = (seconds) => Math.round(seconds * 1000) / 1000;
-export const isBreak = ({ expression, start }) => start === undefined && expression.trim().toUpperCase() === "NEUTRAL";
-export const keyOf = (name) => name.trim().replace(/\s*:\s*/g, ":").replace(/[\s_-]+/g, "_").toUpperCase();
-const empty = () => ({ timeline: { channel: [{ name: "1", entries: [] }] }, speech: { text: "", words: [], peaks: [] } });
+const keys = new Map(); // name -> its key, which ignores case and separators
+export const keyOf = (name) => keys.get(name) ?? keys.set(name, name.trim().replace(/\s*:\s*/g, ":").replace(/[\s_-]+/g, "_").toUpperCase()).get(name);
+export const isBreak = ({ expression, start }) => start === undefined && keyOf(expression) === "NEUTRAL";
+export const isKeys = ({ expression }) => keyOf(expression) === "KEYFRAMES";
+const isStill = (entry) => isBreak(entry) || isKeys(entry); // without onset and offset
+const empty = () => ({ timeline: { channel: [{ name: "1", entries: [] }] }, speech: { says: [], words: [], peaks: [] } });
 
 // Events: "change" whenever what is shown differs, "commit" when a change has ended, "select".
 export class Design extends EventTarget {
@@ -44,7 +47,7 @@ export class Design extends EventTarget {
 
   // Seconds of onset and offset, and of the whole, as realizer/expressions/timeline.py has them.
   times(entry) {
-    if (isBreak(entry)) return { onset: 0, offset: 0, length: entry.duration ?? BREAK };
+    if (isStill(entry)) return { onset: 0, offset: 0, length: entry.duration ?? entry.keys?.at(-1)[0] ?? BREAK };
     const row = this.row(entry) ?? { onset: 0.3, apex: 0.6, offset: 0.5 };
     const [onset, offset] = [entry.onset ?? row.onset, entry.offset ?? row.offset];
     return { onset, offset, length: entry.duration ?? onset + row.apex + offset };
@@ -57,8 +60,8 @@ export class Design extends EventTarget {
     return entries.map((entry, k) => {
       const { onset, offset, length } = times[k];
       const [before, after] = [times[k - 1], times[k + 1]];
-      const rise = k && joins === "onset" ? (isBreak(entry) ? before.offset : onset) : k && joins === "offset" ? 0 : onset;
-      const fall = !after ? offset : joins === "onset" ? 0 : joins === "offset" ? (isBreak(entry) ? after.onset : offset) : offset;
+      const rise = k && joins === "onset" ? (isStill(entry) ? before.offset : onset) : k && joins === "offset" ? 0 : onset;
+      const fall = !after ? offset : joins === "onset" ? 0 : joins === "offset" ? (isStill(entry) ? after.onset : offset) : offset;
       const part = Math.min(1, length / (rise + fall || 1));
       const span = { entry, start: at, reached: at + rise * part, left: at + length - fall * part, end: at + length };
       at += length;
@@ -113,7 +116,7 @@ export class Design extends EventTarget {
     try {
       const kept = JSON.parse(localStorage.getItem(DRAFT));
       if (!kept?.timeline.channel.some(({ entries }) => entries.length)) return false;
-      this.state = kept;
+      this.state = { ...kept, speech: { ...empty().speech, ...kept.speech } };
       return true;
     } catch {
       return false;
@@ -240,7 +243,7 @@ export class Design extends EventTarget {
   }
 }
 
-export const titleOf = ({ expression }) => expression.replace(/^template:/i, "").replaceAll("_", " ").toLowerCase();
+export const titleOf = ({ expression, faps = [] }) => faps.length ? `FAP ${faps.length > 4 ? `${faps.slice(0, 3).join(", ")} and ${faps.length - 3} more` : faps.join(", ")}` : expression.replace(/^template:/i, "").replaceAll("_", " ").toLowerCase();
 
 // The same without fields that have no value.
 function tidy(row) {

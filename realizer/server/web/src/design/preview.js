@@ -4,9 +4,9 @@ const CHUNK = 12; // frames of one request
 const KEPT = 600; // frames
 
 export class Preview {
-  // ask(request): the service's answer. stage: whose face it is. ended(): playing has ended.
-  constructor(ask, stage, design, ended) {
-    Object.assign(this, { ask, stage, design, ended, frames: new Map(), edition: 0, time: 0, began: null, loop: true, single: null });
+  // ask(request): the service's answer. stage: whose face it is. voice: what is said. ended(): playing has ended.
+  constructor(ask, stage, design, voice, ended) {
+    Object.assign(this, { ask, stage, design, voice, ended, frames: new Map(), edition: 0, time: 0, began: null, loop: true, single: null });
     design.addEventListener("change", () => this.forget());
   }
 
@@ -22,13 +22,20 @@ export class Preview {
     return this.began !== null;
   }
 
+  // Seconds of what is shown or said.
+  get duration() {
+    return Math.max(this.design.duration, this.voice.duration);
+  }
+
   play() {
-    if (this.time >= this.design.duration - 1 / FPS) this.time = 0;
+    if (this.time >= this.duration - 1 / FPS) this.time = 0;
     this.began = performance.now() / 1000 - this.time;
+    this.voice.play(this.time);
     this.want(this.time);
   }
 
   pause() {
+    if (this.playing) this.voice.stop();
     this.began = null;
   }
 
@@ -50,20 +57,28 @@ export class Preview {
   // The frames to draw and the time among them; null: the face of the session.
   now() {
     if (this.single) return { frames: this.single, time: 0 };
-    if (this.playing) this.advance(performance.now() / 1000 - this.began);
+    if (this.playing) this.advance();
     const k = Math.floor(this.time * FPS + 1e-6);
     const pair = [this.frames.get(k), this.frames.get(k + 1)].filter(Boolean);
     if (pair.length) this.last = pair;
     return this.last ? { frames: this.last, time: this.time } : null;
   }
 
-  advance(time) {
-    const { duration } = this.design;
+  advance() {
+    const { duration, voice } = this;
+    const now = performance.now() / 1000;
+    if (!voice.source) voice.play(now - this.began); // sound was switched on meanwhile
+    const time = Math.max(0, voice.time ?? now - this.began);
+    this.began = now - time;
     if (time > duration && !this.loop) {
       this.time = duration;
       this.pause();
       this.ended();
-    } else this.time = duration ? time % duration : 0;
+    } else if (time > duration) {
+      this.time = duration ? time % duration : 0;
+      this.began = now - this.time;
+      voice.play(this.time);
+    } else this.time = time;
     this.want(this.time);
     if (this.playing) this.want(Math.min(duration, this.time + CHUNK / FPS));
   }
@@ -92,9 +107,10 @@ export class Preview {
   }
 }
 
+export const bytesOf = (data) => Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0)).buffer;
+
 // [Int16Array] of the frames of an answer.
 function decoded({ data, count }) {
-  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
-  const all = new Int16Array(bytes.buffer);
+  const all = new Int16Array(bytesOf(data));
   return Array.from({ length: count }, (_, k) => all.subarray((k * all.length) / count, ((k + 1) * all.length) / count));
 }

@@ -8,7 +8,7 @@ const COLUMNS = 8; // of the sheet of pictures
 export class Strip {
   // ask(request): the service's answer. add(expression, event): use it; the event is where it was dropped.
   constructor(ask, design, add) {
-    Object.assign(this, { ask, design, add, order: new Map() });
+    Object.assign(this, { ask, design, add, order: new Map(), pictures: new Map() });
     this.panel = at("design-cards");
     at("design-find").oninput = () => this.find(at("design-find").value.trim());
   }
@@ -33,7 +33,9 @@ export class Strip {
     const sheet = URL.createObjectURL(await answer.blob());
     this.panel.style.setProperty("--sheet", `url("${sheet}")`);
     this.panel.style.setProperty("--rows", Math.ceil(this.order.size / COLUMNS));
+    this.pictures = this.order;
     this.panel.classList.add("drawn");
+    for (const card of this.panel.querySelectorAll(".d-card")) this.picture(card);
   }
 
   async find(words, all) {
@@ -45,7 +47,7 @@ export class Strip {
       return this.none(error.message);
     }
     if (asked !== this.asked) return;
-    if (!found.length) return this.none("Nothing has this name.");
+    if (!found.length) return this.none("Nothing has this name. Make it under Expression, and save it to the library.");
     // Without a search those first about whose lengths and company something is known.
     const known = words ? found : found.toSorted((a, b) => b.name.startsWith("template:") - a.name.startsWith("template:"));
     this.panel.replaceChildren(...known.map((row) => this.card(row)));
@@ -57,15 +59,22 @@ export class Strip {
 
   card(row) {
     const { name, features, means, units } = row;
-    const k = this.order.get(name) ?? 0;
     const face = make("i.thumb", { ariaHidden: "true" });
-    face.style.setProperty("--x", k % COLUMNS);
-    face.style.setProperty("--y", Math.floor(k / COLUMNS));
     const title = `${name}: ${features || means.join(", ")} (${units})`;
     const card = make("button.d-card", { type: "button", title, ariaLabel: `Add ${titleOf({ expression: name })}: ${features || means.join(", ")}` }, face, make("b", {}, titleOf({ expression: name })), make("span", {}, units));
+    card.expression = name;
+    this.picture(card);
     card.onclick = () => this.dropped || this.add(row);
     card.onpointerdown = (event) => this.drag(event, row, card);
     return card;
+  }
+
+  // Show the place of its expression on the sheet of pictures; a new one is not on it yet.
+  picture(card) {
+    const k = this.pictures.get(card.expression);
+    card.classList.toggle("blank", k === undefined);
+    card.style.setProperty("--x", (k ?? 0) % COLUMNS);
+    card.style.setProperty("--y", Math.floor((k ?? 0) / COLUMNS));
   }
 
   // Drag a card to a lane. A finger that moves up or down scrolls instead.

@@ -8,22 +8,25 @@ import { Lanes } from "./lanes.js";
 import { Design, ms, titleOf } from "./model.js";
 import { Preview } from "./preview.js";
 import { Strip } from "./strip.js";
+import { Voice } from "./voice.js";
 
 const FORMS = { toml: "text/plain", bml: "text/xml", fap: "text/x-fap", csv: "text/csv" };
 const LOST = "The service cannot be reached. Your changes are kept in this browser.";
 
 export class DesignTab {
-  // link: the connection; stage: the face.
-  constructor(link, stage) {
-    Object.assign(this, { link, stage, open: false, marks: new Map() });
+  // link: the connection; stage: the face; sound, recorder: the page's. hear(): switch sound on. film(on): begin or end one.
+  constructor(link, stage, { sound, recorder, hear, film }) {
+    Object.assign(this, { link, stage, hear, record: film, open: false, marks: new Map() });
     this.tool = new Checker();
     this.model = new Design();
-    this.preview = new Preview((request) => this.ask(request), stage, this.model, () => this.showPlaying());
-    this.lanes = new Lanes(at("design-score"), this.model, { told: (words) => this.stop(words), scrub: (time) => this.look(time), inspect: () => at("design-inspector").querySelector("input")?.focus() });
+    this.voice = new Voice((request) => this.ask(request), sound, recorder);
+    this.preview = new Preview((request) => this.ask(request), stage, this.model, this.voice, () => this.showPlaying());
+    this.lanes = new Lanes(at("design-score"), this.model, { told: (words) => this.stop(words), scrub: (time) => this.look(time, true), inspect: () => at("design-inspector").querySelector("input")?.focus() });
     this.strip = new Strip((request) => this.ask(request), this.model, (row, event) => this.add(row, event));
     this.inspector = new Inspector(this.model, { marks: (entry) => this.marks.get(entry) ?? [], edit: (row) => this.edit(row), lanes: this.lanes });
     this.expression = new Expression({ preview: this.preview, save: (message) => link.ask(message), told: (words) => this.tell(words), saved: () => this.strip.load(stage.name) });
     this.model.addEventListener("commit", () => this.check());
+    this.model.addEventListener("change", () => this.speak());
     this.view("Library");
     this.wire();
   }
@@ -80,7 +83,10 @@ export class DesignTab {
     this.open = open;
     at("time").hidden = at("report").hidden = open;
     at("design-time").hidden = !open;
-    if (!open) return this.preview.pause();
+    if (!open) {
+      this.preview.pause();
+      return this.showPlaying();
+    }
     this.lanes.fit();
     this.begin();
   }
@@ -129,18 +135,47 @@ export class DesignTab {
     return model.isFree(lane, time, time + length) ? time : (model.spans(model.shown.channel[lane]).at(-1)?.end ?? time);
   }
 
-  look(time) {
+  // Get the sound of what is said.
+  async speak() {
+    try {
+      await this.voice.load(this.model.speech.says);
+    } catch (error) {
+      this.tell(error.message, "bad");
+    }
+  }
+
+  look(time, heard = false) {
     this.preview.look(time);
+    if (heard) this.voice.scrub(time);
     this.lanes.now(this.preview.time); // at once: the next key may come before the next picture
     this.showPlaying();
   }
 
   play() {
+    if (this.voice.buffer) this.hear();
     this.preview.playing ? this.preview.pause() : this.preview.play();
     this.showPlaying();
   }
 
+  // Film the timeline from its begin to its end.
+  async film() {
+    const { preview } = this;
+    const { loop } = preview;
+    preview.loop = false;
+    this.look(0);
+    await preview.want(0);
+    await this.record(true);
+    preview.play();
+    this.showPlaying();
+    this.tell("Filming; Pause ends the film.");
+    await new Promise((done) => (this.paused = done));
+    preview.loop = loop;
+    await this.record(false);
+    this.tell("");
+  }
+
   showPlaying() {
+    if (!this.preview.playing) this.paused?.();
     at("design-play").ariaPressed = String(this.preview.playing);
     at("design-play").lastChild.textContent = this.preview.playing ? "Pause" : "Play";
   }
@@ -231,12 +266,12 @@ export class DesignTab {
   // Show what the service makes of a text or a file; what it leaves out is said.
   async take(request) {
     try {
-      const { timeline, left_out: left, text, words, peaks } = await this.ask(request);
+      const { timeline, left_out: left, says, words, peaks } = await this.ask(request);
       const channel = timeline.channel.length ? timeline.channel : [{ name: "1", entries: [] }];
-      this.model.show({ timeline: { ...timeline, channel }, speech: { text, words, peaks } });
+      this.model.show({ timeline: { ...timeline, channel }, speech: { says, words, peaks } });
       this.model.select(null);
       this.look(0);
-      if (text) at("design-text").value = text;
+      if (says.length) at("design-text").value = says.map(([, text]) => text).join(" ");
       if (left.length) this.tell(`Left out: ${left.join("; ")}`, "amber");
     } catch (error) {
       this.tell(error.message, "bad");
@@ -247,10 +282,10 @@ export class DesignTab {
     const form = at("design-form").value;
     at("design-form").value = "";
     try {
-      const { text: speech } = this.model.state.speech;
-      const { text } = await this.ask({ tool: "export", form, timeline: this.model.file, ...(speech ? { text: speech } : {}) });
+      if (form === "film") return await this.film();
+      const { text } = await this.ask({ tool: "export", form, timeline: this.model.file, says: this.model.speech.says });
       download(new Blob([text], { type: FORMS[form] }), `timeline.${form}`);
-      this.tell(form === "toml" ? "realizer timeline timeline.toml -o timeline.mp4 makes a film of it; Record above films what you see." : form === "bml" ? "BML has no joins, curves and mixer: channels blend by the strongest." : "");
+      this.tell(form === "toml" ? "realizer timeline timeline.toml -o timeline.mp4 makes a film of it." : form === "bml" ? "BML has no joins, curves and mixer: channels blend by the strongest, and keyframes begin and end softly." : "");
     } catch (error) {
       this.tell(error.message, "bad");
     }

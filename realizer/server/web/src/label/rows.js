@@ -11,19 +11,19 @@ export class Rows extends Lanes {
     if (time !== null) this.begun.style.setProperty("--at", time);
   }
 
-  laneOf(channel, lane) {
-    const row = super.laneOf(channel, lane);
-    const name = row.firstChild;
+  laneOf(channel, ...rest) {
+    const row = super.laneOf(channel, ...rest);
+    const name = row.element.firstChild;
     name.title = channel.own ? `Labels of ${channel.name}` : `Labels of ${channel.name}, to compare with`;
-    row.classList.toggle("fixed", !channel.own);
+    row.element.classList.add("plain");
+    row.list.querySelector(".d-empty")?.remove();
+    row.element.classList.toggle("fixed", !channel.own);
     return row;
   }
 
-  blockOf(span) {
-    const block = super.blockOf(span);
-    for (const handle of block.querySelectorAll(".d-onset, .d-offset, .d-amount")) handle.remove();
-    block.firstChild.remove();
-    block.dataset.lasts = `${titleOf(span.entry)}, ${span.start.toFixed(2)} to ${span.end.toFixed(2)} s`;
+  shape(block, span) {
+    super.shape(block, span);
+    block.lasts = `${titleOf(span.entry)}, ${span.start.toFixed(2)} to ${span.end.toFixed(2)} s`;
     return block;
   }
 
