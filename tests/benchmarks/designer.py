@@ -34,6 +34,7 @@ MEASURE = """async ([blocks, lanes]) => {
   const send = (target, type, x) => target.dispatchEvent(new PointerEvent(type, at(x)));
   send(block, "pointerdown", box.x + 9);
   const moving = timed((k) => send(window, "pointermove", box.x + 20 + (k % 50)), 50);
+  if (design.model.shown === design.model.state.timeline) throw new Error("the drag has moved nothing");
   dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
   return { playing, editing, moving };
 }"""
