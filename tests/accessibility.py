@@ -6,7 +6,7 @@ import pytest
 
 
 def serious_faults(page: Any, **options: Any) -> list[str]:
-    """Return rule and HTML of each serious or critical fault of a page of Playwright.
+    """Return rule and HTML of each fault of a page of Playwright that is serious, or that stops a keyboard.
 
     Args:
         options: of axe, such as `runOnly`.
@@ -16,5 +16,5 @@ def serious_faults(page: Any, **options: Any) -> list[str]:
     return [
         f"{fault['id']}: {fault['nodes'][0]['html'][:200]}"
         for fault in found
-        if fault["impact"] in ("serious", "critical")
+        if fault["impact"] in ("serious", "critical") or fault["id"] == "scrollable-region-focusable"
     ]
