@@ -4,10 +4,12 @@ Apart from espeak-ng and hibari, which are extras, it comes from Debian: apt-get
 festival-czech festival-ca festvox-{kallpc16k,kdlpc16k,itapc16k,italp16k,czech-dita,czech-krb,czech-machac}
 festvox-{czech-ph,suopuhe-lj,suopuhe-mv,us-slt-hts,ca-ona-hts,ru} pocketsphinx-testdata hunspell-cs
 w{american,dutch,ngerman,french,polish,spanish,italian,swedish,catalan,portuguese}
+fortunes fortunes-{de,it,es,cs,pl,br}
 """
 
 from __future__ import annotations
 
+import re
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -32,6 +34,18 @@ CZECH_WORDS = Path("/usr/share/hunspell/cs_CZ.dic")
 RECORDED = Path("/usr/share/festival/voices/russian/msu_ru_nsh_clunits")
 LIBRIVOX = Path("/usr/share/pocketsphinx/test/data/librivox")
 WORDS = (3, 9)  # words of a random sentence
+FORTUNES = Path("/usr/share/games/fortunes")
+# Dictionary -> files of `FORTUNES` with sentences of the language.
+QUOTES = {
+    "american-english": "[!b]*",
+    "ngerman": "de/*",
+    "italian": "it/*",
+    "spanish": "es/*",
+    "czech": "cs/*",
+    "polish": "pl/*",
+    "portuguese": "brasil",
+}
+CLAUSE = re.compile(r"(?:[^\W\d_]+(?:'[^\W\d_]+)?,? ){3,11}[^\W\d_]+[.!?]")
 
 
 def _ipa_of(pairs: str) -> dict[str, str]:
@@ -96,6 +110,26 @@ def sentences(dictionary: str, count: int, random: np.random.Generator) -> list[
     return [" ".join(some).capitalize() + "." for some in picked]
 
 
+@cache
+def quotes_of(dictionary: str) -> list[str]:
+    """Return sentences of a language that people wrote, of at most twelve words."""
+    files = sorted(FORTUNES.glob(QUOTES[dictionary])) if dictionary in QUOTES else []
+    # Links lead to other languages, and files with other suffixes are indices.
+    real = (
+        f for f in files if f.suffix in ("", ".fortunes") and f.is_file() and f.parent == f.resolve().parent
+    )
+    texts = (file.read_bytes().decode("utf-8", "replace") for file in real)
+    return [clause for text in texts for clause in CLAUSE.findall(" ".join(text.split()))]
+
+
+def texts(dictionary: str, count: int, random: np.random.Generator) -> list[str]:
+    """Return sentences, two thirds of them by people if there are any in this language."""
+    quotes = quotes_of(dictionary)
+    quoted = min(len(quotes), 2 * count // 3)
+    some = [quotes[k] for k in random.choice(len(quotes), quoted, replace=False)] if quoted else []
+    return some + sentences(dictionary, count - quoted, random)
+
+
 def classes(phonemes: Sequence[Phoneme], times: Float64) -> Index:
     """Return (n,) the class at each time: the last for silence, `NOT_SEEN` for sounds without mouth shape."""
     numbers = [row["visemes"] for row in viseme_facts()["class"]]
@@ -134,9 +168,10 @@ def by_festival(name: str, texts: list[str], rates: tuple[float, ...]) -> Iterat
         lines = [f"(voice_{name})"]
         for k, text in enumerate(texts):
             lines.append(f"(Parameter.set 'Duration_Stretch {1 / rates[k % len(rates)]:.3f})")
-            lines.append(f'(set! u (SynthText "{text}"))')
+            # Some voices fail at some words.
+            lines.append(f'(unwind-protect (begin (set! u (SynthText "{text}"))')
             lines.append(f'(utt.save.wave u "{folder}/{k}.wav" \'riff)')
-            lines.append(f'(utt.save.segs u "{folder}/{k}.lab")')
+            lines.append(f'(utt.save.segs u "{folder}/{k}.lab")) nil)')
         script = Path(folder, "say.scm")
         script.write_text("\n".join(lines), coding, errors="ignore")
         subprocess.run(["festival", "-b", str(script)], check=False, capture_output=True)

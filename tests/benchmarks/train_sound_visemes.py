@@ -1,223 +1,269 @@
-"""Trains the network that hears visemes: python tests/benchmarks/train_sound_visemes.py [--data DIR]
+"""Trains the network that hears visemes: python tests/benchmarks/train_sound_visemes.py FILE ...
 
-Speech of `spoken_corpus` is varied in rate, pitch, noise, room, bandwidth and level. The network is a
-perceptron with two hidden layers; Adam minimises its cross-entropy, in which rare classes weigh more.
-Speakers that `lips_from_sound.py` measures as unknown are left out.
+The files are written by `viseme_frames.py`. Each time a sentence is used, it comes from another throat,
+through another microphone, in another noise and level. The network is a perceptron; Adam minimises its
+cross-entropy, in which rare classes weigh more. With JAX and a GPU it takes minutes: `pip install jax`.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-import zlib
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
-from scipy.signal import fftconvolve, resample_poly
-from spoken_corpus import (
-    FESTIVAL,
-    NOT_SEEN,
-    Spoken,
-    by_festival,
-    by_flite,
-    by_voice,
-    classes,
-    russian,
-    sentences,
+
+from realizer.speech.sound_visemes.mel_stream import (
+    ACTIVE,
+    BANDS,
+    FALL,
+    FIRST_LEVEL,
+    HIGHEST,
+    LOWEST,
+    PRIOR,
+    mel_triangles,
+    viseme_facts,
 )
+from realizer.speech.sound_visemes.recogniser import FLOOR, FUTURE, OFFSETS, PAST, SCALE, SILENT, WEIGHTS
 
-from realizer.speech.sound_visemes.mel_stream import BANDS, HOP, RATE, MelStream, viseme_facts
-from realizer.speech.sound_visemes.recogniser import FUTURE, OFFSETS, WEIGHTS, context
-
-# espeak-ng's language, dictionary.
-ESPEAK = {
-    "en-us": "american-english",
-    "en-gb": "american-english",
-    "de": "ngerman",
-    "fr": "french",
-    "es": "spanish",
-    "pl": "polish",
-    "nl": "dutch",
-    "it": "italian",
-    "cs": "czech",
-    "pt": "portuguese",
-    "ca": "catalan",
-}
-VARIANTS = ("", "f1", "f2", "f3", "f4", "m1", "m2", "m3", "m4", "m5", "m7", "klatt2", "Andrea", "Alex")
-HELD_OUT = ("lp_diphone",)  # beside hibari, flite's rms, espeak's Swedish, and librivox
-RECORDINGS = slice(250)  # of the Russian ones; others are measured
-FLITE = ("slt", "awb", "kal")
-RATES = (1.0, 0.85, 1.2, 1.45, 0.95, 1.1)
-COPIES = 2  # of each sentence, varied
-HIDDEN = (384, 192)
-BATCH, EPOCHS, STEP = 512, 8, 1e-3
-DROPPED = 0.15  # of the hidden units in training
+NOT_SEEN = -1  # the class of sounds without a shape of the lips, such as h
+HIDDEN = (896, 512, 256)
+LENGTH = 480  # frames at most that are used together
+EPOCHS, STEP, TOGETHER, TESTED = 120, 1e-3, 32, 8
+DROPPED = 0.2  # of the hidden units in training
+DECAY = 0.02  # of the weights
+SMOOTH = 0.05  # of the certainty of each label
+KEPT = 0.999  # of the averaged weights in a step
 RARITY = 0.6  # exponent of the weight of a rare class
+# What varies: the logarithm of the size of the throat, the spectrum of the microphone by its first cosines,
+# dB of the noise below the speech, the loudest sample, and the most bands that are hidden.
+THROAT, MICROPHONE, NOISE, LOUDEST, HIDDEN_BANDS = 0.13, (1.2, 0.6, 0.4, 0.3), (8.0, 50.0), (0.02, 0.6), 4
+
+Layers = list[list[Any]]
 
 
-def corpus(amount: int, random: np.random.Generator) -> Iterator[Spoken]:
-    """Yield sentences of all speakers: `amount` of each voice of Festival and flite."""
-    for name, (dictionary, *_) in FESTIVAL.items():
-        if name not in HELD_OUT:
-            yield from by_festival(name, sentences(dictionary, amount, random), RATES)
-    yield from russian(RECORDINGS)
-    for name in FLITE:
-        yield from by_flite(name, sentences("american-english", amount, random), RATES)
-    each = max(1, amount // 2 // len(VARIANTS) * 2)
-    for language, dictionary in ESPEAK.items():
-        for variant in VARIANTS:
-            name = f"espeak:{language}+{variant}".rstrip("+")
-            yield from by_voice(name, language, sentences(dictionary, each, random), RATES)
+def mel_places() -> np.ndarray:
+    """Return (BANDS,) the middles of the bands on the mel scale, log(1 + f / 700 Hz)."""
+    low, high = np.log1p(np.array([LOWEST, HIGHEST]) / 700)
+    return np.asarray(low + (np.arange(BANDS) + 1) / (BANDS + 1) * (high - low))
 
 
-def varied(spoken: Spoken, random: np.random.Generator) -> Spoken:
-    """Return speech at 16 kHz in another pitch, bandwidth, room, noise and level."""
-    pitch = random.uniform(0.85, 1.2)  # higher and faster, with shorter resonances
-    sound = resample_poly(spoken.pcm.astype(np.float32), 160, round(160 * spoken.rate * pitch / RATE))
-    scale = len(spoken.pcm) / spoken.rate / (len(sound) / RATE)
-    if random.random() < 0.2:  # a telephone
-        sound = resample_poly(resample_poly(sound, 1, 2), 2, 1)
-    if random.random() < 0.5:
-        decay = random.uniform(0.03, 0.15)  # s to a fall of 9 dB
-        tail = np.arange(round(4 * decay * RATE)) / RATE
-        room = random.normal(size=len(tail)) * np.exp(-tail / decay) * random.uniform(0.01, 0.08)
-        room[0] = 1.0
-        sound = fftconvolve(sound, room)[: len(sound)]
-    tilt = random.uniform(-0.6, 0.6)
-    sound = sound - tilt * np.append(0.0, sound[:-1])
-    power = np.sqrt(np.mean(sound**2)) + 1.0
-    noise = (
-        np.cumsum(random.normal(size=len(sound))) if random.random() < 0.4 else random.normal(size=len(sound))
+def changed(key: Any, log: Any) -> Any:
+    """Return the frames (n, BANDS) of a sentence by another speaker in another place."""
+    keys, mel, at = jax.random.split(key, 8), mel_places(), np.arange(BANDS)
+    warp = jnp.exp(jax.random.uniform(keys[0], minval=-THROAT, maxval=THROAT))
+    place = jnp.interp(jnp.log1p(jnp.expm1(mel) * warp), mel, at)
+    low = jnp.minimum(place.astype(int), BANDS - 2)
+    part = place - low
+    log = log[:, low] * (1 - part) + log[:, low + 1] * part
+    waves = np.cos(np.pi * np.arange(1, len(MICROPHONE) + 1)[:, None] * (at + 0.5) / BANDS)
+    log = log + (jax.random.normal(keys[1], (len(MICROPHONE),)) * jnp.array(MICROPHONE)) @ waves
+    # Noise adds its power, which varies as that of a few narrow bands does.
+    triangles = mel_triangles(BANDS, LOWEST, HIGHEST)
+    widths = triangles.sum(axis=0)
+    bins = widths**2 / (triangles**2).sum(axis=0) / 1.5
+    power = jnp.exp(log)
+    noise = widths * jnp.exp(-2 * mel * jax.random.uniform(keys[2]))
+    decibels = jax.random.uniform(keys[3], minval=NOISE[0], maxval=NOISE[1])
+    noise *= power.mean() / noise.mean() * 10 ** (-decibels / 10)
+    # A gamma distribution with many degrees of freedom, by Wilson & Hilferty 1931.
+    normal = jax.random.normal(keys[4], log.shape)
+    power += noise * jnp.maximum(1 - 1 / (9 * bins) + normal / jnp.sqrt(9 * bins), 0) ** 3
+    level = 2 * jnp.log(jax.random.uniform(keys[5], minval=LOUDEST[0], maxval=LOUDEST[1]) / LOUDEST[1])
+    return jnp.maximum(jnp.log(power) + level, SILENT)
+
+
+def followed(log: Any) -> tuple[Any, Any]:
+    """Return the loud level (n,) and the mean spectrum (n, BANDS) after each frame, as `MelStream` does."""
+    fall = FALL * jnp.arange(1, len(log) + 1)
+    level = jnp.maximum(jax.lax.cummax(log.max(axis=1) + fall), FIRST_LEVEL) - fall
+    active = log.max(axis=1) > level - ACTIVE
+    count = PRIOR + jnp.cumsum(active)
+    # In sentences of more than a few seconds older frames count a little more than there.
+    total = PRIOR * jnp.array(viseme_facts()["mean"]) + jnp.cumsum(
+        jnp.where(active[:, None], log - level[:, None], 0), axis=0
     )
-    noise -= np.convolve(noise, np.full(401, 1 / 401), "same")
-    sound = sound + noise / noise.std() * power * 10 ** (-random.uniform(10, 50) / 20)
-    sound *= random.uniform(0.02, 0.6) * 32767 / np.abs(sound).max()
-    phonemes = tuple(type(p)(p.start / scale, p.end / scale, p.ipa) for p in spoken.phonemes)
-    return Spoken(spoken.speaker, RATE, sound.astype(np.int16), phonemes)
+    return level, total / count[:, None]
 
 
-def prepare(folder: Path, amount: int) -> None:
-    """Write frames and classes of the varied corpus."""
-    random = np.random.default_rng(1)
-    kept: list[tuple[np.ndarray, ...]] = []
-    begin, seconds = time.perf_counter(), 0.0
-    speaker = ""
-    for spoken in corpus(amount, random):
-        if spoken.speaker != speaker:
-            speaker = spoken.speaker
-            print(f"{time.perf_counter() - begin:5.0f} s: {seconds / 60:.0f} min, {speaker}", flush=True)
-        for _ in range(COPIES):
-            one = varied(spoken, random)
-            # Silence follows, in which the last windows end.
-            frames = MelStream(RATE).feed(np.append(one.pcm, np.zeros(RATE // 20, np.int16)))
-            labels = classes(one.phonemes, np.arange(len(frames.log)) * HOP / RATE)
-            is_test = zlib.crc32(f"{speaker}{len(kept) // 2}".encode()) % 25 == 0
-            kept.append((frames.log, frames.level, frames.mean, labels, np.full(len(labels), is_test)))
-            seconds += len(one.pcm) / RATE
-    names = ("log", "level", "mean", "labels", "is_test")
-    columns = {name: np.concatenate(part) for name, part in zip(names, zip(*kept, strict=True), strict=True)}
-    ends = np.cumsum([len(part[0]) for part in kept])
-    np.savez(folder / "frames.npz", **columns, ends=ends)
+def inputs(key: Any, log: Any, vary: bool) -> Any:
+    """Return the inputs (n - FUTURE, frames x BANDS) of a sentence (n, BANDS)."""
+    keys = jax.random.split(key, 4)
+    log = changed(keys[0], log) if vary else log
+    level, mean = followed(log)
+    padded = jnp.concatenate([jnp.full((PAST, BANDS), SILENT), log])
+    rows = np.arange(LENGTH - FUTURE)[:, None]
+    near = padded[rows + PAST + OFFSETS]
+    loud = jnp.maximum(near - level[FUTURE:, None, None], -FLOOR) - mean[FUTURE:, None]
+    if vary:
+        first, width = jax.random.uniform(keys[1]) * BANDS, jax.random.uniform(keys[2]) * HIDDEN_BANDS
+        at = np.arange(BANDS)
+        loud = jnp.where((at >= first) & (at < first + width) & jax.random.bernoulli(keys[3]), 0, loud)
+    return (loud / SCALE).reshape(len(rows), -1)
 
 
-def train(folder: Path, epochs: int, resume: bool) -> None:
-    """Train the network and write it."""
-    data = dict(np.load(folder / "frames.npz"))
-    known = dict(np.load(WEIGHTS)) if resume else {}
-    random = np.random.default_rng(2)
-    labels, count = data["labels"], len(data["labels"])
-    # Contexts do not cross from one sentence to another.
-    first = np.repeat(np.append(0, data["ends"][:-1]), np.diff(data["ends"], prepend=0))
-    last = np.repeat(data["ends"], np.diff(data["ends"], prepend=0))
-    at = np.arange(count)
-    usable = (labels != NOT_SEEN) & (at + FUTURE < last)
-    chosen, test = np.flatnonzero(usable & ~data["is_test"]), np.flatnonzero(usable & data["is_test"])
-    size = len(viseme_facts()["class"])
-    share = np.bincount(labels[chosen], minlength=size) / len(chosen)
-    weight = share**-RARITY
-    weight /= (weight * share).sum()
-    print(f"{count / 6000:.0f} min, shares {np.round(100 * share, 1)}")
+def logits(layers: Layers, x: Any, key: Any) -> Any:
+    """Return the logarithms (..., classes) of the probabilities, but for a constant."""
+    for i, (w, b) in enumerate(layers):
+        x = x @ w + b
+        if i + 1 < len(layers):
+            x = jnp.maximum(x, 0)
+            if key is not None:
+                kept = jax.random.bernoulli(jax.random.fold_in(key, i), 1 - DROPPED, x.shape)
+                x = x * kept / (1 - DROPPED)
+    return x
 
-    def inputs(rows: np.ndarray) -> np.ndarray:
-        near = rows[:, None] + OFFSETS
-        # Before a sentence is digital silence.
-        log = np.where((near >= first[rows, None])[..., None], data["log"][near], np.float32(-23.0))
-        now = rows + FUTURE
-        return context(log, data["level"][now], data["mean"][now])
 
-    sizes = (len(OFFSETS) * BANDS, *HIDDEN, size)
-    layers = (
-        [
-            [known[f"w{k}"].astype(np.float32), known[f"b{k}"].astype(np.float32)]
-            for k in range(len(sizes) - 1)
-        ]
-        if resume
-        else [
-            [random.normal(0, np.sqrt(2 / a), (a, b)).astype(np.float32), np.zeros(b, np.float32)]
-            for a, b in pairwise(sizes)
-        ]
-    )
-    moments = [[np.zeros_like(v) for v in layer] + [np.zeros_like(v) for v in layer] for layer in layers]
-    steps, total = 0, epochs * (len(chosen) // BATCH)
-    begin = time.perf_counter()
-    for epoch in range(epochs):
-        order, loss = random.permutation(chosen), 0.0
-        for k in range(0, len(order) - BATCH + 1, BATCH):
-            rows = order[k : k + BATCH]
-            outs = [inputs(rows)]
-            for i, (w, b) in enumerate(layers):
-                x = outs[-1] @ w + b
-                if i < len(HIDDEN):
-                    keep = random.random(x.shape, np.float32) >= DROPPED
-                    x = np.maximum(x, 0) * keep * np.float32(1 / (1 - DROPPED))
-                outs.append(x)
-            p = np.exp(outs[-1] - outs[-1].max(axis=1, keepdims=True))
-            p /= p.sum(axis=1, keepdims=True)
-            own = weight[labels[rows]].astype(np.float32)
-            loss -= float((own * np.log(p[np.arange(BATCH), labels[rows]] + 1e-9)).sum())
-            p[np.arange(BATCH), labels[rows]] -= 1
-            error = p * (own[:, None] / BATCH)
-            steps += 1
-            speed = STEP * min(1, steps / 500) * 0.5 * (1 + np.cos(np.pi * steps / total))
-            for i in reversed(range(len(layers))):
-                w, b = layers[i]
-                slopes = (outs[i].T @ error + np.float32(1e-5) * w, error.sum(axis=0))
-                if i:
-                    error = (error @ w.T) * (outs[i] > 0)
-                for j, slope in enumerate(slopes):
-                    m, v = moments[i][j], moments[i][j + 2]
-                    m += np.float32(0.1) * (slope - m)
-                    v += np.float32(0.001) * (slope * slope - v)
-                    rise = np.float32(speed * np.sqrt(1 - 0.999**steps) / (1 - 0.9**steps))
-                    layers[i][j] -= rise * m / (np.sqrt(v) + np.float32(1e-8))
-        x = inputs(test[:: max(1, len(test) // 20000)])
-        truth = labels[test[:: max(1, len(test) // 20000)]]
-        for i, (w, b) in enumerate(layers):
-            x = x @ w + b if i == len(HIDDEN) else np.maximum(x @ w + b, 0)
-        right = [float((x[truth == c].argmax(axis=1) == c).mean()) for c in range(size)]
-        print(
-            f"epoch {epoch + 1}, {time.perf_counter() - begin:.0f} s: loss {loss / len(order):.3f}, "
-            f"balanced {np.mean(right[:-1]):.3f}, {np.round(right, 2)}",
-            flush=True,
-        )
-        arrays = {
-            f"{'wb'[j]}{i}": layer[j].astype(np.float16) for i, layer in enumerate(layers) for j in range(2)
+class Frames:
+    """The stored sentences, in pieces of at most `LENGTH` frames."""
+
+    def __init__(self, files: list[Path], left_out: list[str]) -> None:
+        parts = [dict(np.load(file)) for file in files]
+        counts = np.cumsum([0, *(part["ends"][-1] for part in parts)])
+        data = {
+            "log": np.concatenate([np.cumsum(part["log"], axis=1, dtype=np.uint8) for part in parts], axis=1),
+            "ends": np.concatenate([part["ends"] + n for part, n in zip(parts, counts[:-1], strict=True)]),
+            **{name: np.concatenate([part[name] for part in parts]) for name in ("labels", "speakers")},
         }
-        np.savez_compressed(WEIGHTS, **arrays, shares=(weight * share).astype(np.float16))
+        self.step = float(parts[0]["step"])  # of the stored logarithms
+        self.log = jnp.asarray(data["log"].T)
+        self.labels = jnp.asarray(data["labels"].astype(np.int32))
+        starts = np.append(0, data["ends"][:-1])
+        pieces = [
+            (at, min(LENGTH, end - at), speaker)
+            for start, end, speaker in zip(starts, data["ends"], data["speakers"], strict=True)
+            for at in range(start, max(start + 1, end - LENGTH // 4), LENGTH)
+        ]
+        self.starts, self.lengths = (np.array([piece[k] for piece in pieces]) for k in (0, 1))
+        speakers = np.array([piece[2] for piece in pieces])
+        self.tests = {name: np.flatnonzero(speakers == name) for name in left_out}
+        self.training = np.flatnonzero(~np.isin(speakers, left_out))
+        seen = data["labels"][data["labels"] != NOT_SEEN]
+        self.share = np.bincount(seen, minlength=len(viseme_facts()["class"])) / len(seen)
+
+
+def batch(
+    log: Any, labels: Any, step: Any, starts: Any, lengths: Any, key: Any, vary: bool
+) -> tuple[Any, Any]:
+    """Return inputs (k, n, m) and labels (k, n) of sentences; `NOT_SEEN` after their ends."""
+    rows = jnp.minimum(starts[:, None] + np.arange(LENGTH), len(labels) - 1)
+    inside = np.arange(LENGTH) < lengths[:, None]
+    frames = jnp.where(inside[..., None], log[rows] * step + SILENT, SILENT)
+    found = jax.vmap(lambda k, one: inputs(k, one, vary))(jax.random.split(key, len(starts)), frames)
+    seen = jnp.where(inside[:, FUTURE:], labels[rows[:, : LENGTH - FUTURE]], NOT_SEEN)
+    return found, seen
+
+
+@jax.jit
+def improved(
+    state: tuple[Layers, Layers, Layers, Layers], data: tuple[Any, ...], weight: Any, rate: Any, count: Any
+) -> Any:
+    """Return the layers, both moments and the averaged layers after a step of Adam, and the loss."""
+    layers, first, second, average = state
+    x, labels = batch(*data, True)
+    key = jax.random.fold_in(data[-1], 1)
+
+    def loss(layers: Layers) -> Any:
+        logs = jax.nn.log_softmax(logits(layers, x, key))
+        own = jnp.take_along_axis(logs, jnp.maximum(labels, 0)[..., None], axis=-1)[..., 0]
+        entropy = -(1 - SMOOTH) * own - SMOOTH * logs.mean(axis=-1)
+        part = jnp.where(labels == NOT_SEEN, 0, weight[labels])
+        return (entropy * part).sum() / jnp.maximum(part.sum(), 1)
+
+    value, slopes = jax.value_and_grad(loss)(layers)
+    each = jax.tree.map
+    first = each(lambda m, g: 0.9 * m + 0.1 * g, first, slopes)
+    second = each(lambda v, g: 0.999 * v + 0.001 * g * g, second, slopes)
+    scale = jnp.sqrt(1 - 0.999**count) / (1 - 0.9**count)
+    layers = each(
+        lambda w, m, v: w - rate * (scale * m / (jnp.sqrt(v) + 1e-8) + DECAY * w), layers, first, second
+    )
+    kept = jnp.minimum(KEPT, count / (count + 10))
+    average = each(lambda a, w: kept * a + (1 - kept) * w, average, layers)
+    return (layers, first, second, average), value
+
+
+@jax.jit
+def counted(layers: Layers, data: tuple[Any, ...]) -> Any:
+    """Return (classes, classes) how many frames of each class are taken for each."""
+    x, labels = batch(*data, False)
+    found = logits(layers, x, None)
+    size = found.shape[-1]
+    pairs = jnp.where(labels == NOT_SEEN, size * size, labels * size + found.argmax(axis=-1))
+    return jnp.bincount(pairs.ravel(), length=size * size + 1)[:-1].reshape(size, size)
+
+
+def tested(layers: Layers, frames: Frames) -> str:
+    """Return the balanced share of right frames, without silence, of the speakers that are left out."""
+    found = []
+    for name, pieces in frames.tests.items():
+        parts = pieces[: len(pieces) // TESTED * TESTED].reshape(-1, TESTED)
+        key = jax.random.key(0)
+        data = (
+            (frames.log, frames.labels, frames.step, frames.starts[p], frames.lengths[p], key) for p in parts
+        )
+        counts = sum(np.asarray(counted(layers, one)) for one in data)[:-1]
+        right = [row[k] / row.sum() for k, row in enumerate(counts) if row.sum()]
+        heard = counts[0, 0] / max(counts[:, 0].sum(), 1)
+        found.append(f"{name} {np.mean(right):.3f} (p b m {right[0]:.2f}, of found {heard:.2f} real)")
+    return ", ".join(found)
+
+
+def train(frames: Frames, out: Path, epochs: int) -> None:
+    """Train the network and write it."""
+    random, key = np.random.default_rng(2), jax.random.key(2)
+    weight = frames.share**-RARITY
+    weight /= (weight * frames.share).sum()
+    sizes = (len(OFFSETS) * BANDS, *HIDDEN, len(frames.share))
+    layers: Layers = [
+        [jnp.asarray(random.normal(0, np.sqrt(2 / a), (a, b)), jnp.float32), jnp.zeros(b)]
+        for a, b in pairwise(sizes)
+    ]
+    state: Any = (layers, *(jax.tree.map(jnp.zeros_like, layers) for _ in range(2)), layers)
+    each = len(frames.training) // TOGETHER
+    begin, total = time.perf_counter(), epochs * each
+    for epoch in range(epochs):
+        order, losses = random.permutation(frames.training), []
+        for k in range(each):
+            count = epoch * each + k + 1
+            rate = STEP * min(1, count / 500) * 0.5 * (1 + np.cos(np.pi * count / total))
+            some = order[k * TOGETHER : (k + 1) * TOGETHER]
+            data = frames.log, frames.labels, frames.step, frames.starts[some], frames.lengths[some]
+            key, now = jax.random.split(key)
+            state, loss = improved(state, (*data, now), jnp.asarray(weight), rate, float(count))
+            losses.append(loss)
+        if epoch % 5 == 4 or epoch + 1 == epochs:
+            print(
+                f"epoch {epoch + 1}, {time.perf_counter() - begin:.0f} s: loss {np.mean(losses):.3f}; "
+                f"{tested(state[3], frames)}",
+                flush=True,
+            )
+            written(out, state[3], weight * frames.share)
+
+
+def written(out: Path, layers: Layers, shares: np.ndarray) -> None:
+    arrays = {
+        f"{'wb'[j]}{i}": np.asarray(part, np.float16)
+        for i, layer in enumerate(layers)
+        for j, part in enumerate(layer)
+    }
+    np.savez_compressed(out, **arrays, shares=shares.astype(np.float16))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--data", type=Path, default=Path("/tmp"), help="where frames.npz is kept")
-    parser.add_argument("--amount", type=int, default=84, help="sentences of each voice")
+    parser.add_argument("files", type=Path, nargs="+", help="from viseme_frames.py")
+    parser.add_argument("--out", type=Path, default=WEIGHTS, help="the network")
     parser.add_argument("--epochs", type=int, default=EPOCHS)
-    parser.add_argument("--resume", action="store_true", help="start with the weights that there are")
+    parser.add_argument("--leave-out", default="", help="speakers to measure instead, separated by commas")
     options = parser.parse_args()
-    if not (options.data / "frames.npz").exists():
-        prepare(options.data, options.amount)
-    train(options.data, options.epochs, options.resume)
+    frames = Frames(options.files, [name for name in options.leave_out.split(",") if name])
+    print(f"{len(frames.labels) / 6000:.0f} min, shares of the classes {np.round(100 * frames.share, 1)} %")
+    train(frames, options.out, options.epochs)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,6 @@ WEIGHTS = Path(__file__).with_name("weights.npz")
 # The context of a frame: each frame near it, and every other one before.
 PAST, FUTURE = 25, 7
 OFFSETS = np.array([*range(-PAST, -9, 2), *range(-8, FUTURE + 1)])
-LAYERS = 3
 FLOOR = 14.0  # bands this much below the loud level are silent; natural logarithm of power
 SCALE = 3.0  # about the standard deviation of the logarithms
 SILENT = float(np.log(QUIETEST))
@@ -53,9 +52,10 @@ def context(log: Float32, level: Float32, mean: Float32) -> Float32:
 def log_probabilities(inputs: Float32) -> Float32:
     """Return the logarithms (..., classes) of the probabilities; the last two axes are one product."""
     arrays, x = _arrays(), inputs
-    for k in range(LAYERS):
+    layers = len(arrays) // 2
+    for k in range(layers):
         x = x @ arrays[f"w{k}"] + arrays[f"b{k}"]
-        if k + 1 < LAYERS:
+        if k + 1 < layers:
             x = np.maximum(x, 0)
     x = x - x.max(axis=-1, keepdims=True)
     found: Float32 = x - np.log(np.exp(x).sum(axis=-1, keepdims=True))
