@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 
-from realizer.core.array_types import Float32, Float64
+from realizer.core.array_types import Bool, Float32, Float64
 from realizer.speech.accents import phrases, prosody_facts
 from realizer.speech.utterance import Phoneme, Utterance
 from realizer.tables.phonemes import vowels
@@ -21,7 +21,7 @@ LEAST = 0.02  # s of a sound beside a pause
 
 
 def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
-    """Return its phonemes; vowels have the requested volume times the loudness at which they are heard.
+    """Return its phonemes, with the requested volume times the loudness at which they are heard.
 
     The loudness is relative to the median of the vowels, and the last accent of a phrase, which is the most
     prominent one, is louder by the table's factor. Pauses include the silence that a voice counts to the
@@ -29,20 +29,20 @@ def with_loudness(utterance: Utterance) -> tuple[Phoneme, ...]:
     """
     sound = Levels(utterance) if utterance.pcm is not None and utterance.sample_rate else None
     phonemes = utterance.phonemes if sound is None else _with_whole_pauses(utterance, sound)
-    sung = [k for k, phoneme in enumerate(phonemes) if phoneme.ipa[:1] in vowels()]
-    if not sung:
+    vocal = np.array([phoneme.ipa[:1] in vowels() for phoneme in phonemes])
+    if not vocal.any():
         return phonemes
-    spans = np.array([(phonemes[k].start, phonemes[k].end) for k in sung])
-    loud = np.ones(len(spans)) if sound is None else _relative(sound.of(spans))
+    spans = np.array([(phoneme.start, phoneme.end) for phoneme in phonemes])
+    loud = np.ones(len(spans)) if sound is None else _relative(sound.of(spans), vocal)
     for accent in (
         accent.time for phrase in phrases(utterance) for accent in phrase.accents if accent.nuclear
     ):
-        loud[(spans[:, 0] <= accent) & (accent < spans[:, 1])] *= prosody_facts()["accents"]["louder"]
-    heard = list(phonemes)
-    for k, factor in zip(sung, loud.tolist(), strict=True):
-        one = phonemes[k]
-        heard[k] = Phoneme(one.start, one.end, one.ipa, one.stress, one.volume * factor)
-    return tuple(heard)
+        at = vocal & (spans[:, 0] <= accent) & (accent < spans[:, 1])
+        loud[at] *= prosody_facts()["accents"]["louder"]
+    return tuple(
+        Phoneme(one.start, one.end, one.ipa, one.stress, one.volume * factor) if one.ipa else one
+        for one, factor in zip(phonemes, loud.tolist(), strict=True)
+    )
 
 
 def _with_whole_pauses(utterance: Utterance, sound: Levels) -> tuple[Phoneme, ...]:
@@ -84,9 +84,9 @@ class Levels:
         return levels
 
 
-def _relative(levels: Float64) -> Float64:
-    """Return levels (m,) over their median, within the table's limits; 1 for silence."""
-    usual = float(np.median(levels))
+def _relative(levels: Float64, vocal: Bool) -> Float64:
+    """Return levels (m,) over the median of the vocal ones, within the table's limits; 1 for silence."""
+    usual = float(np.median(levels[vocal]))
     limit = prosody_facts()["accents"]["range"]
     return np.clip(levels / usual, 1 / limit, limit) if usual > 0 else np.ones(len(levels))
 

@@ -108,13 +108,16 @@ def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
         firm = pressure["sounds"].get(phoneme.ipa[:1], pressure["other"])
         for part in parts:
             until = at + part.share * length
+            # Loud vowels open further, silent stops less.
+            limits = loudness["vowel" if part.vowel else "consonant"]
+            effort = max(phoneme.volume, 0.0) ** limits["exponent"]
+            effort = float(min(max(effort, limits["least"]), limits["most"]))
             if part.vowel:
-                # A vowel opens further because it is loud.
-                effort = max(max(phoneme.volume, 0.0) ** loudness["exponent"], loudness["least"])
-                size, effort = _size(phoneme, until - at), float(min(effort, loudness["most"]))
+                size = _size(phoneme, until - at)
                 rows.append(_Row(at, until, part.mix, part.shape, True, size, effort))
             else:
-                rows.append(_Row(at, until, part.mix, part.shape, pressure=firm))
+                effort = effort if part.mix and part.mix[0][0] in limits["visemes"] else 1.0
+                rows.append(_Row(at, until, part.mix, part.shape, effort=effort, pressure=firm))
             at = until
     return rows
 

@@ -95,10 +95,16 @@ def volumes(utterance: Utterance) -> list[float]:
     return [p.volume for p in with_loudness(utterance) if p.ipa == "a"]
 
 
-def test_with_loudness_scales_vowels_by_their_amplitude() -> None:
+def test_with_loudness_scales_sounds_by_their_amplitude() -> None:
     found = np.array(volumes(said(stressed=0)))
     assert found / found[4] == pytest.approx([LOUDER, 0.5, 1, 2, 1], rel=0.05)
-    assert [p.volume for p in with_loudness(said()) if p.ipa == "s"] == [1.0] * 5
+    hissed = [p.volume for p in with_loudness(said()) if p.ipa == "s"]
+    # A twentieth of the usual vowel, but within the range.
+    assert hissed == pytest.approx([1 / prosody_facts()["accents"]["range"]] * 5)
+
+
+def test_with_loudness_scales_no_consonant_without_sound() -> None:
+    assert {p.volume for p in with_loudness(said(sound=False)) if p.ipa == "s"} == {1.0}
 
 
 def test_with_loudness_makes_the_last_accent_of_a_phrase_louder() -> None:
