@@ -59,7 +59,7 @@ def find_voice(name: str | None = None) -> Voice:
 
     Raises:
         VoiceError: if it is not installed; the text says what to do.
-        UnknownVoiceError: if there is no such voice.
+        UnknownVoiceError: if there is no such voice, or its engine has none of that name.
         PluginError: if the voice belongs to a plug-in that cannot be used.
     """
     if name is None:
@@ -72,8 +72,10 @@ def find_voice(name: str | None = None) -> Voice:
             f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to install them"
         )
     voice = VOICES[engine]
-    if fix := voice.missing(variant or None):
+    if fix := voice.missing():
         raise VoiceError(fix)
+    if fix := voice.missing(variant or None):
+        raise UnknownVoiceError(fix)
     return voice(variant or None)
 
 

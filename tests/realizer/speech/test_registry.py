@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from realizer.core.errors import VoiceError
+from realizer.core.errors import UnknownVoiceError, VoiceError
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.registry import VOICES, find_voice, voices
@@ -83,7 +83,7 @@ def test_find_voice_prefers_sound() -> None:
 
 
 def test_find_voice_refuses_an_unknown_name() -> None:
-    with pytest.raises(VoiceError, match=f"wanted one of {', '.join(VOICES)}, got 'hal'"):
+    with pytest.raises(UnknownVoiceError, match=f"wanted one of {', '.join(VOICES)}, got 'hal'"):
         find_voice("hal")
 
 
@@ -93,5 +93,5 @@ def test_find_voice_takes_the_name_of_an_engine(name: str) -> None:
 
 
 def test_find_voice_refuses_a_variant_of_a_voice_that_has_none() -> None:
-    with pytest.raises(VoiceError, match="voice silent: wanted nothing after its name, got 'loud'"):
+    with pytest.raises(UnknownVoiceError, match="voice silent: wanted nothing after its name, got 'loud'"):
         find_voice("silent:loud")
