@@ -7,7 +7,8 @@ export const DELAY: number;
 
 /** Why the service refused a message, or why there is no connection. */
 export class RealizerError extends Error {
-  /** As in the message `error`; "refused" for a block, "connection" for the connection. */
+  /** As in the message `error`; "refused" for a block, "connection" for the connection, "gap" for a
+   * session that ended while there was none. */
   code: string;
   /** Message type and field, or block. */
   where: string | null;

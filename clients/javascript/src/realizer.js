@@ -39,7 +39,7 @@ export class Realizer {
   // stream, character and view -> { message, take, streamInfo: fields of `subscribed`, playout: with `ahead` }
   #streams = new Map();
   #unsent = []; // documents to send once the connection is open
-  #awaited = new Map(); // block id -> [{ planned, resolve, reject }]
+  #awaited = new Map(); // block id -> [{ planned, interrupted, resolve, reject }]
 
   /**
    * @param {object} [options]
@@ -77,8 +77,10 @@ export class Realizer {
     url.searchParams.set("session", this.session);
     if (this.seen !== null) url.searchParams.set("seen", this.seen);
     const socket = (this.socket = new WebSocket(url));
+    let wasOpen = false;
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
+      wasOpen = true;
       this.#tries = 0;
       for (const { message, playout } of this.#streams.values()) {
         playout?.reset();
@@ -92,6 +94,8 @@ export class Realizer {
     socket.onmessage = (event) => this.#receive(event.data);
     socket.onerror = nothing; // `onclose` follows
     socket.onclose = ({ reason }) => {
+      // What comes later waits for the next connection, and is not interrupted.
+      if (wasOpen) for (const one of this.#waiting()) one.interrupted = true;
       reject(new RealizerError(`no connection to ${this.url}${reason ? `: ${reason}` : ""}`));
       if (this.#closed) return;
       this.onlost();
@@ -103,7 +107,7 @@ export class Realizer {
   close() {
     this.#closed = true;
     this.socket?.close();
-    for (const { reject } of [...this.#asked, ...[...this.#awaited.values()].flat()]) reject(over());
+    for (const { reject } of [...this.#asked, ...this.#waiting()]) reject(over());
     this.#asked = [];
     this.#unsent = [];
     this.#awaited.clear();
@@ -273,8 +277,7 @@ export class Realizer {
     if (!data.startsWith("{")) return this.#feedback(data);
     const message = JSON.parse(data);
     if (JSON_STREAMS.includes(message.type)) return this.#frame(jsonFrameOf(message));
-    // A new session of the same name: its numbers start again.
-    if (message.type === "gap") this.seen = null;
+    if (message.type === "gap") this.#gap(message);
     if (message.type === "subscribed" || message.type === "changed") {
       const stream = this.#streams.get(keyOf(message));
       if (stream) stream.streamInfo = { ...stream.streamInfo, ...message };
@@ -282,6 +285,22 @@ export class Realizer {
     if (message.type === "error" && /^(speech\b|clip:)/.test(message.where)) this.#refuse(message);
     this.#answer(message);
     this.onreply(message);
+  }
+
+  /** Some feedback is not available. Without any that was seen, this is a new session of the same name. */
+  #gap({ seen, first }) {
+    this.seen = null;
+    if (seen < first) return;
+    for (const [id, all] of this.#awaited) {
+      for (const one of all.filter(({ interrupted }) => interrupted)) {
+        one.reject(new RealizerError(`${id}: the session has ended; this is another one of its name`, "gap", id));
+      }
+      this.#awaited.set(id, all.filter(({ interrupted }) => !interrupted));
+    }
+  }
+
+  #waiting() {
+    return [...this.#awaited.values()].flat();
   }
 
   #frame(frame) {
