@@ -24,6 +24,7 @@ those are solved by Clarabel, whose solution is made exact in the same way.
 from __future__ import annotations
 
 import gc
+import random
 import statistics
 import time
 from collections.abc import Callable
@@ -159,6 +160,22 @@ def clashing(n: int) -> Work:
     return block(body), {f"f{k}": timing(FACE, d) for k, d in enumerate(lengths(n))}
 
 
+def impossible(n: int) -> Work:
+    """Return nods that are each impossible by themselves."""
+    body = "".join(f'<head id="n{k}" lexeme="NOD" start="0" end="0.1" stroke="5"/>' for k in range(n))
+    return block(body), {f"n{k}": timing(NOD, 0.8) for k in range(n)}
+
+
+def tangled(n: int) -> Work:
+    """Return nods, each from a random point of an earlier one to 3 s after that of another; many clash."""
+    chance = random.Random(1)
+    body = '<head id="n0" lexeme="NOD"/>'
+    for k in range(1, n):
+        start, end = (f"n{chance.randrange(k)}:{chance.choice(NOD)}" for _ in range(2))
+        body += f'<head id="n{k}" lexeme="NOD" start="{start}" end="{end} + 3"/>'
+    return block(body), {f"n{k}": timing(NOD, 0.8) for k in range(n)}
+
+
 def median(work: Work, least: float = 0.5) -> Times:
     """Return the median time of one schedule, over at least five runs and `least` seconds."""
     schedule_block(*work)
@@ -232,6 +249,8 @@ TABLE: list[tuple[str, Callable[[], Work], float | None]] = [
     ("2,000 without links", lambda: loose(2000), 40.0),
     ("speech of 40 phrases, 2 faces each", lambda: phrases(40), 8.0),
     ("200 in clashing pairs", lambda: clashing(200), None),
+    ("1,000 that are each impossible", lambda: impossible(1000), 80.0),
+    ("400 cross-linked at random", lambda: tangled(400), 70.0),
 ]
 
 
