@@ -54,6 +54,7 @@ class Opened:
     Attributes:
         says: (start, text) of each speech, in seconds.
         words: (start, end, word) of the speeches, in seconds.
+        syncs: (time, id) of the sync points in their texts, in seconds.
         peaks: largest amplitude of their sound, 0..1, in each hundredth of a second; [] without sound.
     """
 
@@ -61,6 +62,7 @@ class Opened:
     left_out: list[str] = field(default_factory=list)  # what a timeline cannot hold, a sentence each
     says: list[tuple[float, str]] = field(default_factory=list)
     words: list[tuple[float, float, str]] = field(default_factory=list)
+    syncs: list[tuple[float, str]] = field(default_factory=list)
     peaks: list[float] = field(default_factory=list)
 
 
@@ -121,6 +123,7 @@ def _from_bml(documents: Sequence[str], settings: Settings) -> Opened:
     for speech in player.speech():
         begin, said = speech.start, speech.utterance
         found.words += [(begin + word.start, begin + word.end, word.text) for word in said.words]
+        found.syncs += [(begin + time, name) for name, time in said.marks.items()]
         if said.pcm is not None:
             found.peaks += [0.0] * (round(begin * PEAKS) - len(found.peaks))
             found.peaks += _peaks(said.pcm, said.sample_rate)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bml_schema import CORE
 from realizer.cli import cli
 from realizer.core.errors import TableError
 from realizer.core.settings import Settings
@@ -72,6 +73,15 @@ def test_open_file_reads_expressions_of_bml_and_says_what_is_left_out() -> None:
     (anger,) = second.entries
     assert (anger.intensity, anger.duration, anger.because) == (0.5, 2.0, "an exclamation")
     assert (anger.onset, anger.offset, second.start) == (0.2, 0.7, 0.5)
+
+
+def test_open_file_returns_the_sync_points_of_a_speech() -> None:
+    text = "<text>Hello <sync id='here'/>there.</text>"
+    bml = f"<bml xmlns='{CORE}' id='b'><speech id='s' start='1'>{text}</speech></bml>"
+    opened = open_file(bml, SETTINGS)
+    ((time, name),) = opened.syncs
+    assert name == "here"
+    assert time == pytest.approx(opened.words[1][0], abs=0.1)
 
 
 def test_open_file_refuses_what_is_neither() -> None:

@@ -6,11 +6,11 @@ const TALL = 44; // px over which the amount of a block goes from 0 to 1
 const LEAST = 0.04; // s of an onset and an offset
 
 export class Gestures {
-  // The nearest word, block or time 0 within a few pixels, or the time itself.
+  // The nearest word, sync point, block or time 0 within a few pixels, or the time itself.
   snapped(time, without) {
     const { design } = this;
     const edges = design.shown.channel.flatMap((one) => design.blocks(one, without)).flatMap(({ start, end }) => [start, end]);
-    const near = [0, ...edges, ...(design.speech.words).flatMap(([start, end]) => [start, end])].filter((edge) => Math.abs(edge - time) * this.scale < SNAP);
+    const near = [0, ...edges, ...design.speech.words.flatMap(([start, end]) => [start, end]), ...(design.speech.syncs ?? []).map(([time]) => time)].filter((edge) => Math.abs(edge - time) * this.scale < SNAP);
     const best = near.toSorted((a, b) => Math.abs(a - time) - Math.abs(b - time))[0];
     this.line.hidden = best === undefined;
     if (best !== undefined) this.line.style.setProperty("--at", best);

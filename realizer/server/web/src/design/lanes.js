@@ -203,7 +203,7 @@ export class Lanes extends Gestures {
 
   // Seconds, words and sound above the lanes.
   drawRuler() {
-    const { words, peaks, rate = 100 } = this.design.speech;
+    const { words, syncs = [], peaks, rate = 100 } = this.design.speech;
     const known = [words, peaks, this.scale, this.reach];
     if (known.every((one, k) => one === this.ruled?.[k])) return;
     this.ruled = known;
@@ -219,6 +219,7 @@ export class Lanes extends Gestures {
       word.style.setProperty("--long", end - start);
       return word;
     });
+    said.push(...syncs.map(([time, id]) => placed("span.d-sync", time, id)));
     const wave = make("canvas.d-wave", { hidden: !peaks.length, width: Math.max(1, peaks.length), height: 24 });
     const pen = wave.getContext("2d");
     pen.fillStyle = getComputedStyle(this.panel).getPropertyValue("--curve");

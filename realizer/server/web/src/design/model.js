@@ -10,7 +10,7 @@ export const keyOf = (name) => keys.get(name) ?? keys.set(name, name.trim().repl
 export const isBreak = ({ expression, start }) => start === undefined && keyOf(expression) === "NEUTRAL";
 export const isKeys = ({ expression }) => keyOf(expression) === "KEYFRAMES";
 const isStill = (entry) => isBreak(entry) || isKeys(entry); // without onset and offset
-const empty = () => ({ timeline: { channel: [{ name: "1", entries: [] }] }, speech: { says: [], words: [], peaks: [] } });
+const empty = () => ({ timeline: { channel: [{ name: "1", entries: [] }] }, speech: { says: [], words: [], syncs: [], peaks: [] } });
 
 // Events: "change" whenever what is shown differs, "commit" when a change has ended, "select".
 export class Design extends EventTarget {

@@ -266,9 +266,9 @@ export class DesignTab {
   // Show what the service makes of a text or a file; what it leaves out is said.
   async take(request) {
     try {
-      const { timeline, left_out: left, says, words, peaks } = await this.ask(request);
+      const { timeline, left_out: left, says, words, syncs, peaks } = await this.ask(request);
       const channel = timeline.channel.length ? timeline.channel : [{ name: "1", entries: [] }];
-      this.model.show({ timeline: { ...timeline, channel }, speech: { says, words, peaks } });
+      this.model.show({ timeline: { ...timeline, channel }, speech: { says, words, syncs, peaks } });
       this.model.select(null);
       this.look(0);
       if (says.length) at("design-text").value = says.map(([, text]) => text).join(" ");
