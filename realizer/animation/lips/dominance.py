@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -95,6 +95,7 @@ def track_of(phonemes: Sequence[Phoneme]) -> Track | None:
 
 def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
     pressure, loudness = coarticulation()["pressure"], coarticulation()["loudness"]
+    follows = loudness["consonant"]
     rows: list[_Row] = []
     for phoneme in phonemes:
         parts = sounds(phoneme.ipa)
@@ -109,17 +110,21 @@ def _rows(phonemes: Sequence[Phoneme]) -> list[_Row]:
         for part in parts:
             until = at + part.share * length
             # Loud vowels open further, silent stops less.
-            limits = loudness["vowel" if part.vowel else "consonant"]
-            effort = max(phoneme.volume, 0.0) ** limits["exponent"]
-            effort = float(min(max(effort, limits["least"]), limits["most"]))
             if part.vowel:
-                size = _size(phoneme, until - at)
+                size, effort = _size(phoneme, until - at), _effort(phoneme.volume, loudness["vowel"])
                 rows.append(_Row(at, until, part.mix, part.shape, True, size, effort))
+            elif part.mix and part.mix[0][0] in follows["visemes"]:
+                effort = _effort(phoneme.volume, follows)
+                rows.append(_Row(at, until, part.mix, part.shape, effort=effort))
             else:
-                effort = effort if part.mix and part.mix[0][0] in limits["visemes"] else 1.0
-                rows.append(_Row(at, until, part.mix, part.shape, effort=effort, pressure=firm))
+                rows.append(_Row(at, until, part.mix, part.shape, pressure=firm))
             at = until
     return rows
+
+
+def _effort(volume: float, limits: dict[str, Any]) -> float:
+    effort: float = max(volume, 0.0) ** limits["exponent"]
+    return float(min(max(effort, limits["least"]), limits["most"]))
 
 
 @lru_cache(maxsize=2048)
