@@ -113,9 +113,9 @@ class ElementReader:
         faults: list[str] = []
         known = schema.attributes
         points = schema.sync_points if timed else ()
-        items: Any = element.items()
-        if len(items) > MAX_ATTRIBUTES:
+        if len(element.attrib) > MAX_ATTRIBUTES:
             attributes(element)  # raises a Fault
+        items: Any = element.items()
         for name, text in items:
             spec = known.get(name)
             try:
