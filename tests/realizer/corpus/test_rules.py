@@ -16,7 +16,7 @@ from realizer.emotions.words import emotion
 from realizer.knowledge.enrich import Enricher, template_of
 from realizer.knowledge.sentences import sentences
 from realizer.tables.emotional_words import word_list
-from realizer.tables.knowledge import read_knowledge
+from realizer.tables.knowledge import Mood, read_knowledge
 from realizer.tables.templates import read_templates, templates
 
 FPS = 25.0
@@ -74,7 +74,7 @@ def test_write_rules_places_what_the_corpus_shows(folder: Path) -> None:
     company = {(rule.of, rule.other): rule.by for rule in rules.companies}
     assert company["disgust", "anger"] == "around"
     assert rules.apart["happiness"] == 1.0
-    assert rules.mood("glum") == rules.mood("sulky").__class__("glum", rules.moods["sulky"].distance, 1.0)
+    assert rules.mood("glum") == Mood("glum", rules.moods["sulky"].distance, 1.0, "glum")
     assert rules.listener_distance >= rules.usual_distance > 1
 
 

@@ -29,7 +29,8 @@ def test_mirror_follows_an_expression() -> None:
     assert still is not None
     assert still.units["12L"] < 0.15
     values = [sight.units["12L"] for sight in smiling if sight is not None]
-    assert values == sorted(values)
+    # It rises to a plateau, on which the face is found anew in each picture, to a fraction of a pixel.
+    assert np.diff(values).min() > -0.002
     assert values[-1] > 0.5
 
 

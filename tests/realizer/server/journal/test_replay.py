@@ -27,7 +27,7 @@ from realizer.server.journal.session_journal import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from realizer.server.transports.websocket import connection
+from realizer.server.transports.websocket import protocol
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock, spoken
@@ -277,7 +277,7 @@ def test_restored_session_is_unchanged_by_connections_that_still_leave(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
-    monkeypatch.setattr(connection, "GOODBYE", LIMIT)
+    monkeypatch.setattr(protocol, "GOODBYE", LIMIT)
 
     async def run() -> None:
         async with (
