@@ -78,8 +78,7 @@ def test_mouse_answers_all_and_goes_on_after_a_reload(page: Any, study: Path) ->
             page.get_by_role("button", name="Begin").click()
             continue
         assert page.get_by_role("button", name="Next").is_disabled()
-        shown = page.evaluate("[...document.images].every((image) => image.complete && image.naturalWidth)")
-        assert shown
+        page.wait_for_function("[...document.images].every((image) => image.complete && image.naturalWidth)")
         names = page.evaluate(
             "[...latin(steps[judge.place].item.options, steps[judge.place].row), "
             "...ANSWERS[steps[judge.place].kind]]"
