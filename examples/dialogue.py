@@ -29,6 +29,7 @@ import runpy
 import sys
 import threading
 import time
+import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from pathlib import Path
@@ -81,7 +82,11 @@ def openai(url: str, name: str) -> Model:
         if key := os.environ.get("OPENAI_API_KEY"):
             headers["Authorization"] = f"Bearer {key}"
         request = urllib.request.Request(f"{url.rstrip('/')}/chat/completions", body, headers)
-        with urllib.request.urlopen(request, timeout=60) as events:
+        try:
+            events = urllib.request.urlopen(request, timeout=60)
+        except urllib.error.URLError as error:
+            raise OSError(f"--openai {url}: {error.reason}") from None
+        with events:
             for line in events:
                 if line.startswith(b"data: {"):
                     for choice in json.loads(line[6:])["choices"]:
