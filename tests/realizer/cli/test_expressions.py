@@ -99,6 +99,7 @@ def test_find_like_a_neutral_face_that_idles_has_no_match(tmp_path: Path) -> Non
 
 @pytest.mark.xdist_group("picture_search")
 @pytest.mark.slow
+@pytest.mark.long
 def test_find_like_tracks_a_picture_of_none_of_our_faces(tmp_path: Path, monkeypatch) -> None:
     from PIL import Image
 
