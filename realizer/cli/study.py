@@ -138,7 +138,7 @@ def analyse(
         named = ", ".join(f"{judge} ({who})" for who, judge in failed)
         click.echo(f"failed attention items, {'kept' if keep else 'left out'}: {named}", err=True)
     if not keep and len(failed) == len({(one.who, one.judge) for one in answers}):
-        raise click.UsageError("wanted answers of a judge who passed the attention items; see --keep")
+        raise click.ClickException("wanted answers of a judge who passed the attention items; see --keep")
     with inputs.opening(output):
         names = write_report(output, truths, answers, pictures or key.parent / truths["folder"], keep)
     note(f"{output}: {', '.join(names)}")

@@ -112,11 +112,11 @@ def _holes(vertices: Float64, triangles: Int32, eyes: list[Any], mouth: Any) -> 
         if k != lowest and not lids and not inside:
             open_.append((int(mine[0]), int((label[index[:, 0]] == k).sum()), at.mean(axis=0)))
     return [
-        f"it has {len(open_)} holes beside the bust's end: "
+        f"it has {len(open_)} hole{'s' * (len(open_) > 1)} beside the bust's end: "
         + "; ".join(
             f"{edges} open edges at vertex {vertex}, {np.round(place, 3).tolist()}"
             for vertex, edges, place in open_[:4]
         )
         + (" ..." if len(open_) > 4 else "")
-        + "; close it"
+        + f"; close {'it' if len(open_) == 1 else 'them'}"
     ] * bool(open_)

@@ -87,7 +87,7 @@ def test_surface_may_be_open_below_and_at_the_lids_alone(balls: tuple[Face, np.n
     assert surface_faults(at, open_below, face.parts, None) == []
     back = np.linalg.norm(at[open_below].mean(axis=1) - [0, 0, -0.18], axis=1) < 0.03
     (fault,) = surface_faults(at, open_below[~back], face.parts, None)
-    assert fault.startswith("skin: it has 1 holes beside the bust's end")
+    assert fault.startswith("skin: it has 1 hole beside the bust's end")
     assert fault.endswith("; close it")
 
 
