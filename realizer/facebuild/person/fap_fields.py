@@ -22,6 +22,8 @@ BACKWARDS = 0.45  # metres that the corners of the mouth go back for each metre 
 FROM_MIDDLE = 0.1, 1.0  # along the lips more and more between these u,
 CHEEK = 0.035  # m beside them less and less up to there
 BROW = 0.004, 0.009  # m from a brow's line that its skin goes along, and where that has no part any more
+BRIDGE = 0.004, 0.013  # m beside the middle, between the brows, where skin goes along
+DOWN_BRIDGE = 0.034  # m below their line: less and less
 LOWEST = -0.16  # m; below it only the head's FAPs move anything
 
 # Where between wing and eye the side of the nose is raised most, m around, and by what share of the tip.
@@ -104,6 +106,9 @@ def _brows(ground: Ground) -> dict[int, Float64]:
     profile[:, 1] += whole * (1 - profile[:, 1])
     edge = np.interp(x, lid.x, lid.high)
     profile *= np.clip((at[:, 1] - edge) / (middle - BROW[0] - edge), 0, 1)[:, None]
+    # Between the brows the way is spread down the bridge of the nose, which would have a ledge.
+    bridge = smooth(x, *BRIDGE[::-1]) * smooth(middle - at[:, 1], DOWN_BRIDGE, 0.0) * (at[:, 1] < middle)
+    profile[:, 1] = np.maximum(profile[:, 1], np.where(ground.body & (at[:, 2] > 0), bridge, 0))
     # The lid's edge does not follow the brow: FAPs 19 and 20 own it.
     lids = (ground.ellipsoid(ground.point(name), (0.024, 0.0095, 0.03), 0.5) for name in ("3.1", "3.2"))
     calm = 1 - np.maximum(*lids)

@@ -69,6 +69,15 @@ def both(row: Fap) -> list[float]:
     return [usual(row)] if row.least == 0 else [usual(row), -usual(row)]
 
 
+def test_deform_lowers_brows_without_a_ledge_over_the_nose(face: Face) -> None:
+    skin, brow = slice(*face.parts["skin"]), face.points["4.1"][1]
+    at = face.vertices[skin]
+    bridge = (np.abs(at[:, 0]) < 0.001) & (at[:, 2] > 0) & (brow - 0.04 < at[:, 1]) & (at[:, 1] < brow)
+    downwards = np.flatnonzero(bridge)[np.argsort(-at[bridge, 1])]
+    down = at + moved(face, {fap: -130 if fap < 33 else -90 for fap in range(31, 37)})[skin]
+    assert (np.diff(down[downwards, 1]) / np.diff(at[downwards, 1])).min() > 0.49
+
+
 def test_load_face_has_a_default() -> None:
     assert load_face().name in FOLDERS
 
