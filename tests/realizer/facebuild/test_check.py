@@ -217,7 +217,7 @@ def test_check_face_names_a_point_on_no_surface(folder: Path) -> None:
     found = "\n".join(faults(folder))
     assert "5.1: vertex" in found
     assert "no triangle has it" in found
-    assert "skin: it has 1 holes" in found
+    assert "skin: it has 1 hole beside" in found
     assert "open edges at vertex" in found
 
 
