@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -120,45 +122,59 @@ def page(path: Path) -> None:
     Image.open(path).convert("RGB").save(path, optimize=True)
 
 
-def designer(path: Path, theme: str = "light", size: tuple[int, int] = (1440, 900)) -> None:
-    """The tab Design with the lanes of a text, at the second expression."""
-    from playwright.sync_api import sync_playwright
-
-    from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, serving
-
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle", "--voice", "espeak"]
-    with serving(command) as address, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        width, height = size
-        opened = browser.new_page(
-            viewport={"width": width, "height": height}, bypass_csp=True, color_scheme=theme
-        )
-        opened.set_default_timeout(PATIENCE)
-        opened.goto(f"{address}#design")
-        opened.wait_for_selector("#lights button")
-        opened.wait_for_selector("#design-cards.drawn")
-        opened.fill("#design-text", "Are you sure? That is terrible! Yes, I understand.")
-        opened.press("#design-text", "Enter")
-        opened.wait_for_selector(".d-block")
-        opened.click('.d-card[title^="template:disgust:"]')
-        opened.wait_for_selector(".d-ghost")
-        opened.evaluate("Object.assign(realizerPage.stage, { pace() {}, part: 2, stale: true })")
-        opened.evaluate("realizerPage.design.look(realizerPage.design.preview.time + 0.2)")
-        opened.wait_for_timeout(4000)
-        opened.screenshot(path=path, full_page=width < 900)
-    Image.open(path).convert("RGB").save(path, optimize=True)
-
-
 ROOMS = {"desktop": ((1440, 900), "light"), "tablet": ((820, 1180), "dark")}
 
 
+def designer(folder: Path) -> None:
+    """The tab Design with the lanes of a text, at the second expression."""
+
+    def prepare(page: Any) -> None:
+        page.wait_for_selector("#lights button")
+        page.wait_for_selector("#design-cards.drawn")
+        page.fill("#design-text", "Are you sure? That is terrible! Yes, I understand.")
+        page.press("#design-text", "Enter")
+        page.wait_for_selector(".d-block")
+        page.click('.d-card[title^="template:disgust:"]')
+        page.wait_for_selector(".d-ghost")
+        page.evaluate(
+            "Object.assign(realizerPage.stage, { pace() {}, part: 2, stale: true }); scrollTo(0, 0)"
+        )
+        page.evaluate("realizerPage.design.look(realizerPage.design.preview.time + 0.2)")
+
+    rooms(folder, "design", ["--voice", "espeak"], prepare)
+
+
 def labels(folder: Path, corpus: Path) -> None:
-    """The tab Label with the recording `anna` of a corpus, as label-desktop.webp and label-tablet.webp."""
+    """The tab Label with the recording `anna` of a corpus."""
+
+    def prepare(page: Any) -> None:
+        page.wait_for_selector("#label-agreement td")
+        page.click("#label-score .d-block")
+        page.evaluate("realizerPage.label.look(1); scrollTo(0, 0)")
+
+    rooms(folder, "label", ["--corpus", str(corpus)], prepare)
+
+
+def zones(folder: Path) -> None:
+    """The tab Face with the zone of the left corner of the lips."""
+
+    def prepare(page: Any) -> None:
+        page.wait_for_function("realizerPage.room.points.says && !realizerPage.room.loading")
+        page.click('#face [aria-label="What is edited"] >> text="Zones"')
+        page.select_option('#face [aria-label="FAP"]', "59")
+        page.wait_for_function("!realizerPage.room.motion.pending && realizerPage.room.view.stale === false")
+
+    with TemporaryDirectory() as edited:
+        rooms(folder, "face", ["--edit", edited], prepare)
+
+
+def rooms(folder: Path, tab: str, options: list[str], prepare: Callable[[Any], None]) -> None:
+    """A tab as TAB-desktop.webp and TAB-tablet.webp, after `prepare(page)`."""
     from playwright.sync_api import sync_playwright
 
     from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, serving
 
-    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle", "--corpus", str(corpus)]
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--no-idle", *options]
     with serving(command) as address, sync_playwright() as playwright, TemporaryDirectory() as place:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
         for name, ((width, height), scheme) in ROOMS.items():
@@ -166,14 +182,12 @@ def labels(folder: Path, corpus: Path) -> None:
             opened = browser.new_page(viewport=size, bypass_csp=True, color_scheme=scheme)
             opened.set_default_timeout(PATIENCE)
             opened.add_init_script("localStorage.setItem('annotator', 'tom')")
-            opened.goto(f"{address}#label")
-            opened.wait_for_selector("#label-agreement td")
-            opened.click("#label-score .d-block")
-            opened.evaluate("realizerPage.label.look(1); scrollTo(0, 0)")
-            opened.wait_for_timeout(2000)
+            opened.goto(f"{address}#{tab}")
+            prepare(opened)
+            opened.wait_for_timeout(4000)
             opened.screenshot(path=Path(place, "room.png"))
             with Image.open(Path(place, "room.png")) as picture:
-                picture.convert("RGB").save(folder / f"label-{name}.webp", quality=88)
+                picture.convert("RGB").save(folder / f"{tab}-{name}.webp", quality=88)
             opened.close()
 
 
@@ -212,6 +226,7 @@ if __name__ == "__main__":
     emotions(ROOT / "docs" / "emotions.jpg")
     film(ROOT / "docs" / "film-after.jpg")
     page(ROOT / "realizer/examples/page.png")
-    designer(ROOT / "docs" / "design.png")
+    designer(ROOT / "docs")
+    zones(ROOT / "docs")
     with TemporaryDirectory() as place:
         labels(ROOT / "docs", corpus(Path(place)))
