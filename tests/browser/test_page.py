@@ -314,6 +314,7 @@ def test_page_shows_a_face_that_another_client_chose(page) -> None:  # type: ign
     page.wait_for_function(f"realizerPage.stage.name === '{other}'")
     shown = page.evaluate("realizerPage.stage.shownFrames")
     page.wait_for_function(f"realizerPage.stage.shownFrames > {shown} + 5")
+    page.wait_for_function("realizerPage.stage.head.vertices.some((at) => at)")
     vertices = load_face(other).vertices
     width = page.evaluate("Math.max(...realizerPage.stage.head.vertices)")
     assert width == pytest.approx(vertices.max(), abs=0.01), "by the scale of that face"
