@@ -1,6 +1,10 @@
 import { RealizerError } from "./frames.js";
 
 const GATHERING = 3000; // ms; addresses that are found later are left out of the offer
+const CHECKING = 1000; // ms; so often picture and sound are compared
+const CLOSE = 8; // ms; so close to each other they are left alone
+const FARTHEST = 1000; // ms
+const SHARE = 0.6; // of a difference that is corrected at once: what is measured is uneven
 
 /**
  * Receive the picture and the sound of a session by WebRTC, from the service as an ASGI application; browsers only.
@@ -38,9 +42,30 @@ export async function watch({ url, session, token, buffer, ...options }) {
     const body = await answer.json();
     if (!answer.ok) throw new RealizerError(body.error);
     await connection.setRemoteDescription(body);
+    synchronize(connection, Number(buffer ?? 0));
   } catch (error) {
     connection.close();
     throw error;
   }
   return { stream, connection, close: () => connection.close() };
+}
+
+/**
+ * Hold back the pictures, or the sound, so that both are played together. A browser does this too, but slowly: Chromium takes
+ * half a minute, in which lips are early by up to a quarter of a second.
+ */
+export function synchronize(connection, buffer) {
+  const receivers = Object.fromEntries(connection.getReceivers().map((receiver) => [receiver.track.kind, receiver]));
+  let held = 0; // ms; pictures if positive, else sound
+  const check = setInterval(async () => {
+    if (connection.connectionState === "closed") return clearInterval(check);
+    const played = {};
+    for (const { type, kind, estimatedPlayoutTimestamp } of (await connection.getStats()).values())
+      if (type === "inbound-rtp") played[kind] = estimatedPlayoutTimestamp;
+    const early = played.video - played.audio;
+    if (!(Math.abs(early) > CLOSE)) return; // or not known yet
+    held = Math.max(-FARTHEST, Math.min(FARTHEST, held + SHARE * early));
+    receivers.video.jitterBufferTarget = buffer + Math.max(0, held);
+    receivers.audio.jitterBufferTarget = buffer + Math.max(0, -held);
+  }, CHECKING);
 }

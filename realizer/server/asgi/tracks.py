@@ -17,8 +17,8 @@ from realizer.server.streams.audio_stream import PACKET
 RATE = 48000  # Hz, that of Opus
 SAMPLES = round(PACKET * RATE)
 PICTURE_CLOCK = 90000  # Hz
-# Encoding a picture takes longer than encoding sound, and a receiver plays together what left together.
-ENCODING = 0.012  # s
+ENCODING = 0.012  # s; until pictures have shown how long it takes
+SLOWNESS = 10  # pictures over which this time is averaged
 MOST_PICTURES = 8  # that wait; older ones are left out
 MOST_BEHIND = 5  # packets
 QUIET = 300  # of 32768: in a packet without louder samples the delay may change
@@ -65,7 +65,10 @@ class SoundTrack(AudioStreamTrack):
 
 
 class PictureTrack(VideoStreamTrack):
-    """The pictures of a session, each sent when its sound is."""
+    """The pictures of a session, each sent when its sound is.
+
+    A receiver plays together what left together, so pictures are encoded before their time.
+    """
 
     def __init__(self, playout: Playout) -> None:
         super().__init__()
@@ -73,17 +76,21 @@ class PictureTrack(VideoStreamTrack):
         self._pictures: deque[tuple[float, bytes]] = deque(maxlen=MOST_PICTURES)
         self._came = asyncio.Event()
         self._pts = -1
+        self._encoding = ENCODING
+        self._taken = 0.0  # when the last picture was
         self._decoder = av.CodecContext.create("mjpeg", "r")
 
     def put(self, picture: PictureFrame) -> None:
         """Take a JPEG of the stream `video`."""
-        self._playout.note_picture(picture.time, asyncio.get_running_loop().time())
+        self._playout.note_picture(picture.time, asyncio.get_running_loop().time() + self._encoding)
         self._pictures.append((picture.time, picture.payload))
         self._came.set()
 
     async def recv(self) -> av.VideoFrame:
-        """Return the newest picture that is due; wait for it."""
+        """Return the newest picture that is due; wait for it. Its caller has sent the one before."""
         loop = asyncio.get_running_loop()
+        if self._pts >= 0:
+            self._encoding += (loop.time() - self._taken - self._encoding) / SLOWNESS
         while True:
             if self.readyState != "live":
                 raise MediaStreamError
@@ -98,6 +105,7 @@ class PictureTrack(VideoStreamTrack):
             pts = round((time + self._playout.offset - self._playout.began) * PICTURE_CLOCK)
             if pts > self._pts:
                 break
+        self._taken = loop.time()
         (frame,) = await loop.run_in_executor(None, self._decoder.decode, av.Packet(jpeg))
         frame.pts, frame.time_base, self._pts = pts, Fraction(1, PICTURE_CLOCK), pts
         return frame
@@ -108,4 +116,4 @@ class PictureTrack(VideoStreamTrack):
         self._came.set()
 
     def _due(self, time: float) -> float:
-        return time + self._playout.offset - ENCODING
+        return time + self._playout.offset - self._encoding

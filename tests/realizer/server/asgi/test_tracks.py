@@ -93,6 +93,21 @@ def test_picture_track_leaves_out_pictures_that_are_overdue() -> None:
     assert played(act) == pytest.approx(100, abs=8)
 
 
+def test_picture_track_gives_pictures_earlier_where_encoding_takes_long() -> None:
+    async def act(playout: Playout) -> tuple[float, float]:
+        track = PictureTrack(playout)
+        first = track._due(0.0)
+        track.put(picture(0.1))
+        await track.recv()
+        track._taken -= 0.5  # s; encoding it has taken that long
+        track.put(picture(0.2))
+        await track.recv()
+        return first, track._due(0.0)
+
+    first, now = played(act)
+    assert first - now == pytest.approx(0.05, abs=0.03)
+
+
 def test_tracks_end_when_they_are_stopped() -> None:
     async def act(playout: Playout) -> None:
         pictures, sounds = PictureTrack(playout), SoundTrack(playout)
