@@ -98,6 +98,7 @@ class OpenSpeech(ABC):
         self.id = id
         self.progress = SpeechProgress(id)
         self._opening = dict(opening)
+        self._announced = False  # whether the service knows of it
         self._control = control
         self._wait = wait
         self._closed = False
@@ -113,6 +114,8 @@ class OpenSpeech(ABC):
 
     async def stop(self) -> None:
         """Stop speaking at once."""
+        if not self._announced:  # the service cannot stop what it does not know
+            await self._speech(append="")
         await self._control("stop", blocks=[self.id])
 
     async def ended(self) -> BlockProgress:
@@ -136,7 +139,7 @@ class OpenSpeech(ABC):
             await self.close()
 
     async def _speech(self, **fields: Any) -> None:
-        opening, self._opening = self._opening, {}
+        opening, self._opening, self._announced = self._opening, {}, True
         await self._control("speech", id=self.id, **opening, **fields)
 
     def _check_open(self) -> None:

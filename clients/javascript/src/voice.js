@@ -68,6 +68,7 @@ export class Voice {
   /** Stop speaking at once. */
   stop() {
     this.#closed = true;
+    if (!this.#clips) this.#speech({ append: "" }); // the service cannot stop what it does not know
     this.#send(JSON.stringify({ type: "stop", blocks: [this.id] }));
   }
 

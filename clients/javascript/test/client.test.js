@@ -110,6 +110,12 @@ test("voice is silent after stop", async () => {
   assert.ok((await voice.ended()).toString().includes("INTERRUPTED"));
 });
 
+test("voice ends when it is stopped before anything was sent", async () => {
+  const voice = realizer.voice({ rate: RATE });
+  voice.stop();
+  assert.ok((await voice.ended()).toString().includes("INTERRUPTED"));
+});
+
 test("frameOf refuses an unknown kind", () => {
   assert.throws(() => frameOf(new Uint8Array(16).fill(99).buffer), /wanted a frame of kind/);
 });
