@@ -23,7 +23,7 @@ LONGEST_METHOD = 8  # characters, with the blank after it
 POST = (
     "there is nothing to POST to: send BML through the WebSocket at /ws, or run uvicorn realizer.asgi:app\n"
 )
-OTHERS = "wanted GET\n"
+OTHERS = "wanted GET or HEAD\n"
 SLICE = 4 * 1024  # bytes that are parsed before others have their turn: 3 ms of empty frames
 UNIT = 16 * 1024  # bytes that count as much as a frame
 
@@ -35,6 +35,7 @@ class Protocol(ServerProtocol):
         super().__init__(**options)
         self._counts = counts
         self._has_answered = False
+        self._wants_body = True
 
     def parse(self) -> Generator[None]:
         """Parse what the client sends. Refuse other methods here: the library cannot read their bodies."""
@@ -44,7 +45,10 @@ class Protocol(ServerProtocol):
                     break
                 yield
             method, blank, _ = head.partition(b" ")
-            if blank and method.isalpha() and method != b"GET":
+            if blank and method == b"HEAD":  # answered as GET, without the body
+                self.reader.buffer[: len(method)] = b"GET"
+                self._wants_body = False
+            elif blank and method.isalpha() and method != b"GET":
                 self._refuse(method)
                 yield
         yield from super().parse()
@@ -53,6 +57,8 @@ class Protocol(ServerProtocol):
         self._has_answered = True
         if response.status_code >= 400:
             self._counts["http_errors" if response.status_code < 500 else "http_failures"] += 1
+        if not self._wants_body:
+            response.body = b""
         super().send_response(response)
 
     def send_eof(self) -> None:
@@ -65,9 +71,7 @@ class Protocol(ServerProtocol):
 
     def _refuse(self, method: bytes) -> None:
         response = self.reject(*((404, POST) if method == b"POST" else (405, OTHERS)))
-        response.headers["Allow"] = "GET"
-        if method == b"HEAD":
-            response.body = b""
+        response.headers["Allow"] = "GET, HEAD"
         self.handshake_exc = InvalidMessage(f"wanted GET, got {method.decode()}")
         self.send_response(response)
 

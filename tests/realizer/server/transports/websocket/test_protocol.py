@@ -54,13 +54,24 @@ def test_protocol_answers_a_post_with_a_hint() -> None:
         assert b"send BML through the WebSocket at /ws" in answer
 
 
-@pytest.mark.parametrize("method", ["HEAD", "PUT", "DELETE", "OPTIONS", "PATCH", "CONNECT", "TRACE"])
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "PATCH", "CONNECT", "TRACE"])
 def test_protocol_refuses_other_methods(method: str) -> None:
     (answer,) = answers(request(method))
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 405 ")
-    assert b"\r\nAllow: GET" in head
-    assert body == (b"" if method == "HEAD" else b"wanted GET\n")
+    assert b"\r\nAllow: GET, HEAD" in head
+    assert body == b"wanted GET or HEAD\n"
+
+
+def test_protocol_answers_head_as_get_without_the_body() -> None:
+    for path, status in (("/healthz", b"200"), ("/nothing", b"404")):
+        asked, got = answers(request("HEAD", path), request("GET", path))
+        head, blank, body = got.partition(b"\r\n\r\n")
+        assert body
+        assert head.startswith(b"HTTP/1.1 " + status)
+        lines = {line for line in asked.split(b"\r\n") if not line.startswith(b"Date")}
+        assert lines - {b""} <= set(head.split(b"\r\n"))
+        assert asked.endswith(blank)
 
 
 def test_protocol_refuses_a_get_with_a_body() -> None:
