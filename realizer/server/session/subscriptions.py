@@ -54,9 +54,7 @@ class Subscriptions:
         encoding = message.encoding or encodings[0]
         if encoding not in encodings:
             raise FieldError("encoding", f"wanted {' or '.join(encodings)} for {stream}, got {encoding}")
-        if message.ahead and "ahead" not in STREAMS[stream].options:
-            names = " or ".join(name for name, row in STREAMS.items() if "ahead" in row.options)
-            raise FieldError("ahead", f"wanted 0, or the stream {names}: {stream} is not sent ahead")
+        _check_options(message)
         fields: dict[str, Any]
         if stream == "feedback":
             elements = None if message.elements is None else frozenset(message.elements)
@@ -198,6 +196,15 @@ class Subscriptions:
         if stream not in ("audio", "schedule") and character == self.player.characters[0]:
             character = None
         return stream, character, message.view if stream == "video" else None
+
+
+def _check_options(message: Subscribe) -> None:
+    """Raise FieldError for an option of other streams. `fps` is none: every stream can be asked for it."""
+    applying = {"type", "stream", "encoding", "fps", *STREAMS[message.stream].options}
+    for name in sorted(message.model_fields_set - applying):
+        if getattr(message, name) != Subscribe.model_fields[name].default:
+            names = " or ".join(row.name for row in STREAMS.values() if name in row.options)
+            raise FieldError(name, f"wanted the stream {names}, got {message.stream}")
 
 
 def _index_of_view(connection: Connection, old: Subscription | None) -> int:

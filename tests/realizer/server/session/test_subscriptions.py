@@ -215,6 +215,19 @@ def test_subscribe_to_feedback_refuses_an_unknown_element(driver) -> None:
     assert client.of("error")[0]["code"] == "invalid"
 
 
+@pytest.mark.parametrize(
+    ("stream", "option", "words"),
+    [
+        ("fap", {"size": [64, 64]}, "wanted the stream video, got fap"),
+        ("mesh", {"ahead": 0.2}, "wanted the stream fap or au or arkit, got mesh"),
+    ],
+)
+def test_subscribe_refuses_an_option_of_another_stream(driver, stream: str, option, words: str) -> None:
+    (error,) = driver.send({"type": "subscribe", "stream": stream, "fps": 25, **option}).of("error")
+    assert error["where"] == f"subscribe.{next(iter(option))}"
+    assert error["message"] == words
+
+
 def test_subscribe_refuses_a_transparent_jpeg(driver) -> None:
     client = driver.send(subscribe("video", background="transparent"))
     assert client.of("error")[0]["where"] == "subscribe.background"
