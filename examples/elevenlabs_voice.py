@@ -94,4 +94,7 @@ async def main() -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main())
+    try:
+        asyncio.run(main())
+    except OSError as error:  # such as no service
+        sys.exit(str(error))

@@ -41,4 +41,6 @@ def main(folder: str, suffix: str = ".mp4") -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) <= 1:
+        sys.exit(__doc__)
     main(*sys.argv[1:3])

@@ -32,4 +32,9 @@ async def main(address: str, sound: str, table: str | None = None) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main(*sys.argv[1:4]))
+    if len(sys.argv) <= 2:
+        sys.exit(__doc__)
+    try:
+        asyncio.run(main(*sys.argv[1:4]))
+    except OSError as error:  # such as no service
+        sys.exit(str(error))

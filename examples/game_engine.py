@@ -36,4 +36,6 @@ def main(port: int, frames: int = 500) -> None:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) <= 1:
+        sys.exit(__doc__)
     main(*map(int, sys.argv[1:3]))

@@ -97,4 +97,7 @@ async def main(face: str = "ws://127.0.0.1:8765/ws", model: str = OPENAI) -> Non
 
 
 if __name__ == "__main__":
-    asyncio.run(main(*sys.argv[1:3]))
+    try:
+        asyncio.run(main(*sys.argv[1:3]))
+    except OSError as error:  # such as no service
+        sys.exit(str(error))

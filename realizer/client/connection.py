@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from errno import ECONNREFUSED
+
 from realizer.client.async_client import Client
 from realizer.client.message_router import ClientError
 from realizer.client.sync_client import SyncClient
@@ -49,8 +51,8 @@ class PendingConnection:
         except WebSocketException as error:
             raise ClientError(f"{self._url}: {error}") from None
         except OSError as error:
-            error.add_note(f"wanted a service at {self._url}; `realizer serve` starts one")
-            raise
+            words = f"{error.strerror or error}: wanted a service at {self._url}; `realizer serve` starts one"
+            raise OSError(error.errno or ECONNREFUSED, words) from error
         self._client = Client(socket, self._url, lambda url: PendingConnection(url, self._token))
         token = {} if self._token is None else {"token": self._token}
         try:

@@ -65,7 +65,7 @@ def test_connect_raises_os_error_where_nothing_listens() -> None:
         with pytest.raises(OSError, match="Connect") as caught:
             async with connect(url):
                 pass
-        assert caught.value.__notes__ == [f"wanted a service at {url}; `realizer serve` starts one"]
+        assert str(caught.value).endswith(f": wanted a service at {url}; `realizer serve` starts one")
 
     asyncio.run(run())
 
