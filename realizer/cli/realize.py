@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 PICTURES = (".png", ".webp", ".mp4", ".webm")
 # Fields of RenderSettings.
-DRAWN = ("size", "camera", "at", "light", "background", "morphs", "visemes", "avatar")
+LOOK = ("size", "camera", "light", "background")
+DRAWN = (*LOOK, "at", "morphs", "visemes", "avatar")
 
 performance_options = options.several(
     options.fps,
@@ -95,6 +96,10 @@ def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any])
         options.check_camera(chosen.face, drawing.camera)
     with inputs.reporting(ValueError, "--"):
         (writer or OUTPUTS[".json"]).check(drawing)
+    if writer is not None and writer.picture_size is None:
+        usual = RenderSettings()
+        if idle := [f"--{name}" for name in LOOK if getattr(drawing, name) != getattr(usual, name)]:
+            click.echo(f"{writer.suffix} has no pictures: {', '.join(idle)} changes nothing", err=True)
     texts = read()
     if writer is not None:
         drawing = writer.begin(drawing, chosen.face, chosen.deformer)

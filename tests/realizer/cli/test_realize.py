@@ -291,6 +291,14 @@ def test_realize_checks_the_camera_of_pictures_only(tmp_path: Path, suffix: str,
     assert Path(output).exists() is (status == 0)
 
 
+def test_realize_names_options_that_change_nothing_without_pictures(tmp_path: Path) -> None:
+    done = run(
+        "realize", "-", "-o", str(tmp_path / "x.fap"), "--size", "64x64", "--light", "studio", stdin=TALK
+    )
+    assert ".fap has no pictures: --size, --light changes nothing\n" in done.stderr
+    assert "changes nothing" not in run("realize", "-", "-o", str(tmp_path / "x.fap"), stdin=TALK).stderr
+
+
 def test_realize_speaks_a_text(tmp_path: Path) -> None:
     done = run("realize", "Hello there", "--voice", "silent", "-o", str(tmp_path / "x.vtt"))
     assert done.returncode == 0
