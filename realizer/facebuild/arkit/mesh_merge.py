@@ -13,6 +13,7 @@ from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import components, half_edges
 from realizer.facebuild.arkit.materials import Material
+from realizer.facebuild.arkit.part_names import part_of
 from realizer.facebuild.arkit.scene import Piece
 from realizer.tables.arkit_names import canonical
 
@@ -117,14 +118,19 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
 
 
 def _welded(surface: Surface) -> Surface:
-    """Merge vertices at one place that move alike: files double them along every seam of a texture."""
+    """Merge vertices of a part at one place that move alike: files double them along every seam of a texture.
+
+    Hair that is rooted in a vertex of the skin stays a part of its own.
+    """
     values = np.concatenate([surface.vertices, *surface.moves.values()], axis=1)
     is_finite = bool(np.isfinite(values).all())
     size = (float(np.ptp(surface.vertices, axis=0).max()) or 1.0) if is_finite else 0.0
     if not is_finite or np.abs(values).max() > LARGEST * size:
         wanted = f"wanted finite places and moves, up to {LARGEST:g} times the size of the head"
         raise FaceError(f"{wanted}, got NaN, infinity or more; export the head again")
-    key = np.rint(values / (size * SAME)).astype(np.int64)
+    parts = [part_of(names) or "skin" for names in surface.names]
+    part = np.array([parts.index(name) for name in parts])[surface.piece]
+    key = np.column_stack([part, np.rint(values / (size * SAME)).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]

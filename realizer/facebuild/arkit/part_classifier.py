@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -12,7 +11,7 @@ from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
 from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.tables import csv_rows
+from realizer.facebuild.arkit.part_names import part_of
 
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
 BALL = (0.006, 0.022)  # m, radii of eyeballs
@@ -41,31 +40,6 @@ class HeadParts:
         ends = np.cumsum([0] + [len(index) for index in self.parts.values()]).tolist()
         whole = surface.subset(np.concatenate(list(self.parts.values())))
         return whole, dict(zip(self.parts, pairwise(ends), strict=True))
-
-
-@dataclass(frozen=True)
-class _Rule:
-    part: str
-    pattern: str
-
-
-@cache
-def _rules() -> tuple[_Rule, ...]:
-    return csv_rows("parts.csv", _Rule, __package__)
-
-
-def part_of(names: tuple[str, ...]) -> str:
-    """Return the part that the names of a material, a mesh and a node suggest, or "".
-
-    A name that says skin is a last resort: whole heads are called so, with all that is in them.
-    """
-    weak = ""
-    for name in names:
-        rule = next((rule for rule in _rules() if re.search(rule.pattern, name.lower())), None)
-        if rule is not None and rule.part != "skin":
-            return rule.part
-        weak = weak or (rule.part if rule is not None else "")
-    return weak
 
 
 def sort_parts(surface: Surface) -> HeadParts:

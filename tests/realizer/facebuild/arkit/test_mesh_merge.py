@@ -15,11 +15,11 @@ PLAIN = Material("", (0.5, 1, 1, 1), (0, 0, 0), None, "OPAQUE", 0.5, 0, ())
 HALVES = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
 
 
-def piece(aside: float = 0, glass: bool = False, **moves: float) -> Piece:
+def piece(aside: float = 0, glass: bool = False, name: str = "skin", **moves: float) -> Piece:
     """A square whose vertices all move up by what a shape's name says."""
     up = {name: np.tile([0, amount, 0.0], (4, 1)) for name, amount in moves.items()}
     return Piece(
-        ("skin", "m", "n"), SQUARE + np.array([aside, 0, 0]), HALVES, np.full((4, 3), 9.0), SQUARE[:, :2],
+        (name, "m", "n"), SQUARE + np.array([aside, 0, 0]), HALVES, np.full((4, 3), 9.0), SQUARE[:, :2],
         PLAIN, glass, (), up,
     )  # fmt: skip
 
@@ -29,6 +29,12 @@ def test_merge_pieces_shares_the_vertices_of_a_seam() -> None:
     assert len(surface.vertices) == 6
     assert len(surface.triangles) == 4
     assert set(surface.piece.tolist()) == {0, 1}
+
+
+def test_merge_pieces_keeps_hair_that_is_rooted_in_skin_apart() -> None:
+    surface = merge_pieces([piece(), piece(1, name="hair_cards"), piece(2, name="Material.001")])
+    assert len(surface.vertices) == 12
+    assert surface.components().max() == 2
 
 
 def test_merge_pieces_keeps_a_seam_that_opens() -> None:

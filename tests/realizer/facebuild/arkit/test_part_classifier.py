@@ -6,23 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.face.model import Face
-from realizer.facebuild.arkit.part_classifier import ball_behind, is_ball, part_of
-
-
-@pytest.mark.parametrize(
-    ("names", "part"),
-    [
-        (("Teeth_Lower", "", ""), "teeth"),
-        (("", "Hair", ""), "hair"),
-        (("Skin", "Tongue", ""), "tongue"),
-        (("Skin", "", "Head"), "skin"),
-        (("", "Object_1", ""), ""),
-        (("Glasses", "", ""), "other"),
-        (("Glasses_Lens", "", ""), "glass"),
-    ],
-)
-def test_part_of_reads_material_mesh_and_node(names: tuple[str, str, str], part: str) -> None:
-    assert part_of(names) == part
+from realizer.facebuild.arkit.part_classifier import ball_behind, is_ball
 
 
 def test_is_ball_accepts_eyes_and_parts_of_them(balls: tuple[Face, np.ndarray]) -> None:
