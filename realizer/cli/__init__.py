@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         advice = "; choose another one with --port" if error.errno == errno.EADDRINUSE else ""
         words = f"realizer: {error.filename or ''}: {error.strerror or error}{advice}"
         click.echo(words.replace(" : ", " "), err=True)
-        sys.exit(3)
+        sys.exit(2 if isinstance(error, FileNotFoundError) else 3)
 
 
 def _help_of(error: click.ClickException) -> str:

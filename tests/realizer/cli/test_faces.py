@@ -85,6 +85,14 @@ def test_faces_build_without_its_data_exits_with_3(tmp_path: Path) -> None:
     assert str(tmp_path) in done.stderr
 
 
+@pytest.mark.parametrize("command", ["check", "sheet", "fit", "edit"])
+def test_faces_refuses_a_folder_that_is_not_there_with_status_2(tmp_path: Path, command: str) -> None:
+    output = ["-o", str(tmp_path / "x.png")] if command == "sheet" else []
+    done = run("faces", command, str(tmp_path / "gone"), *output)
+    assert done.returncode == 2
+    assert "no such face folder or GLB head" in done.stderr
+
+
 @pytest.fixture
 def head(tmp_path: Path) -> Path:
     path = tmp_path / "anna.glb"
