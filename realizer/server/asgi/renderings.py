@@ -122,7 +122,8 @@ async def _run(body: bytes, options: list[str], folder: Path) -> Path:
 
 
 def fault_of(said: str, folder: Path) -> str:
-    """Return what a command says of its failure, without its usage and the names of our files."""
-    lines = [line for line in said.splitlines() if line and not line.startswith(("Usage: ", "Try "))]
-    lines = [re.sub("^(realizer|Error): ", "", line) for line in lines if str(folder) not in line]
+    """Return what a command says of its failure, without its own options and the names of our files."""
+    lines = [line for line in said.splitlines() if line and not re.match("Usage: |Try |see .* --help$", line)]
+    own = r"^(realizer: |Error: |Invalid value for \S+: |--)+"
+    lines = [re.sub(own, "", line) for line in lines if str(folder) not in line]
     return "\n".join(lines[-20:]) or "the renderer ended"

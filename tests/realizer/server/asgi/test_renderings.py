@@ -86,4 +86,8 @@ def test_renderings_of_one_address_are_limited() -> None:
 def test_fault_of_leaves_out_usage_and_our_files(tmp_path) -> None:
     said = f"Usage: realizer\nTry 'x'\n\nError: wanted a\nrealizer: b\n{tmp_path}/face.fap: not written\n"
     assert fault_of(said, tmp_path) == "wanted a\nb"
+    said = (
+        "realizer: Invalid value for --face: face: wanted a\nrealizer: --at: b\nsee realizer realize --help\n"
+    )
+    assert fault_of(said, tmp_path) == "face: wanted a\nat: b"
     assert fault_of("", tmp_path) == "the renderer ended"
