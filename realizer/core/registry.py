@@ -52,15 +52,22 @@ class Registry(Mapping[str, T], Generic[T]):
         ours: name -> "module:attribute" of the built-in objects.
         wanted: description of the objects, for messages.
         accepts: returns whether an object of a plug-in is of this kind.
+        name_of: returns the name that an object must have in the group; None: any.
     """
 
     def __init__(
-        self, group: str, ours: Mapping[str, str], wanted: str, accepts: Callable[[Any], bool]
+        self,
+        group: str,
+        ours: Mapping[str, str],
+        wanted: str,
+        accepts: Callable[[Any], bool],
+        name_of: Callable[[T], str] | None = None,
     ) -> None:
         self.group = group
         self._ours = ours
         self._wanted = wanted
         self._accepts = accepts
+        self._name_of = name_of
         self._objects: dict[str, T] = {}
 
     def __getitem__(self, name: str) -> T:
@@ -128,6 +135,8 @@ class Registry(Mapping[str, T], Generic[T]):
         if not self._accepts(loaded):
             got = _shortened(loaded)
             raise PluginError(f"{_described(point)} cannot be used: wanted {self._wanted}, got {got}")
+        if self._name_of is not None and (wanted := self._name_of(loaded)) != name:
+            raise PluginError(f"{_described(point)} cannot be used: wanted the name {wanted!r}")
         return loaded
 
 

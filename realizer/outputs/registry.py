@@ -27,6 +27,7 @@ OUTPUTS: Registry[Output] = Registry(
     },
     wanted="a realizer.outputs.output.Output",
     accepts=lambda value: isinstance(value, Output),
+    name_of=lambda output: output.suffix,
 )
 
 
@@ -40,4 +41,5 @@ def output_for(path: str | Path) -> Output:
     for k in range(len(parts)):
         if "".join(parts[k:]) in OUTPUTS:
             return OUTPUTS["".join(parts[k:])]
-    raise ValueError(f"{path}: wanted a suffix of {' '.join(OUTPUTS)}, got {parts[-1] if parts else 'none'}")
+    known = " ".join(name for name, _ in OUTPUTS.working())
+    raise ValueError(f"{path}: wanted a suffix of {known}, got {parts[-1] if parts else 'none'}")

@@ -63,6 +63,13 @@ def test_registry_imports_a_plugin_when_it_is_used(installed):
     assert dict(found.working([".seven"])) == {".seven": 7}
 
 
+def test_registry_refuses_a_plugin_under_another_name_than_its_own(installed):
+    installed({"seven": f"{MODULE}:NUMBER"})
+    found = Registry(GROUP, {}, "a number", lambda value: isinstance(value, int), lambda value: f".{value}")
+    with pytest.raises(PluginError, match=r"cannot be used: wanted the name '\.7'"):
+        found["seven"]
+
+
 @pytest.mark.parametrize(
     ("value", "code", "says"),
     [
