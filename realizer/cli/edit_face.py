@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from realizer.cli.options import option
+from realizer.cli.options import completing_faces, option
 
 if TYPE_CHECKING:
     from realizer.core.settings import Settings
 
 
 @click.command("edit")
-@click.argument("name")
+@click.argument("name", shell_complete=completing_faces)
 @option(
     "--edit",
     "Folder to save in; the copy of the face is in its folder faces.",

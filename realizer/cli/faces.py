@@ -108,7 +108,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
 
 
 @faces.command()
-@click.argument("name")
+@click.argument("name", shell_complete=options.completing_faces)
 @option("-o --output", "Folder of the new face.", options.OUTPUT, required=True)
 @option(
     "--parameters",
@@ -158,7 +158,9 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 
 
 @faces.command()
-@click.argument("names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...")
+@click.argument(
+    "names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...", shell_complete=options.completing_faces
+)
 def check(names: tuple[str, ...]) -> int:
     """Print every fault of face folders; without a name, of all of them.
 
@@ -199,7 +201,7 @@ def _inspect_head(head: Path) -> tuple[str, ...]:
 
 
 @faces.command()
-@click.argument("name", default="default")
+@click.argument("name", default="default", shell_complete=options.completing_faces)
 @option(
     "-o --output FILE",
     "Write a .txt file in the format of Paul (2010, 5.2) or a .csv file.  [default: print the former]",

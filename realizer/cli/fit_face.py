@@ -15,7 +15,7 @@ FORMS = ("published", "extended")
 
 
 @click.command("fit")
-@click.argument("name")
+@click.argument("name", shell_complete=options.completing_faces)
 @option(
     "--from",
     "Fit to measured landmarks: a CSV file with lines # source:, # units:, # licence: and the columns "

@@ -160,13 +160,16 @@ def _opaque(context: click.Context, parameter: click.Parameter, value: str | Non
     return _background(context, parameter, value)
 
 
+completing_faces = completing("realizer.face.load:face_folders")
+
+
 def face(what: str, **attributes: Any) -> Decorator:
     """Return the option --face; `what` says what the face is for."""
     return option(
         "--face NAME|PATH",
         f"{what}: a name of `realizer faces list`, a face folder, or a GLB head.",
         callback=lambda context, parameter, value: check_face(value),
-        shell_complete=completing("realizer.face.load:face_folders"),
+        shell_complete=completing_faces,
         **attributes,
     )
 

@@ -11,7 +11,7 @@ from realizer.cli.progress import counting, note
 
 
 @click.command()
-@click.argument("name")
+@click.argument("name", shell_complete=options.completing_faces)
 @option("-o --output SHEET.png", "Picture to write.", options.OUTPUT, required=True)
 @option("--faps", "Draw every low-level FAP, in both directions.", is_flag=True)
 @option("--aus", "Draw every action unit.  [default: FAPs and action units]", is_flag=True)

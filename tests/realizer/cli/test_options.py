@@ -97,6 +97,8 @@ def test_parse_size_refuses_others(text: str) -> None:
         ("batch --format arkit", "arkit.csv"),
         ("enrich --mood hopef", "hopeful"),
         ("emotion gui", "guilty"),
+        ("faces sheet be", "ben"),
+        ("faces check ada be", "ben"),
     ],
 )
 def test_options_complete_their_values(words: str, found: str) -> None:
