@@ -83,11 +83,8 @@ class Answers:
 
 async def main(face: str = "ws://127.0.0.1:8765/ws", model: str = OPENAI) -> None:
     key = {"Authorization": f"Bearer {os.environ.get('OPENAI_API_KEY', '')}"}
-    async with (
-        connect(face) as client,
-        open_socket(model, additional_headers=key, max_size=None) as socket,
-        asyncio.TaskGroup() as tasks,
-    ):
+    opening = open_socket(model, additional_headers=key, max_size=None)
+    async with connect(face) as client, opening as socket, asyncio.TaskGroup() as tasks:
         answers = Answers(client, socket)
         running = [tasks.create_task(each) for each in (answers.run(), answers.watch())]
         while line := await asyncio.to_thread(sys.stdin.readline):
