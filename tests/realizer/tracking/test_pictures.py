@@ -68,6 +68,56 @@ def test_what_is_no_film_is_refused_with_its_name(
         list(read_pictures(tmp_path / name)[1])
 
 
+def test_a_film_that_is_damaged_in_the_middle_keeps_its_end(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = write_film(tmp_path / "film.mp4", list(range(0, 400, 4)))
+    content = bytearray(path.read_bytes())
+    begin = content.index(b"mdat") + 4
+    length = int.from_bytes(content[begin - 8 : begin - 4], "big")
+    content[begin + length // 2 : begin + length * 3 // 4] = bytes(length * 3 // 4 - length // 2)
+    path.write_bytes(content)
+    found = [picture.time for picture in read_pictures(path)[1]]
+    assert found[0] == 0
+    assert found[-1] == pytest.approx(3.96)
+    assert "parts of it are broken" in caplog.text
+
+
+def test_a_film_that_ends_early_is_warned_of(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = write_film(tmp_path / "film.mkv", list(range(0, 400, 4)), "mpeg4")
+    list(read_pictures(path)[1])
+    assert caplog.text == ""
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    list(read_pictures(path)[1])
+    assert "film.mkv: its pictures end at" in caplog.text
+
+
+def test_a_film_of_an_unknown_codec_is_refused(tmp_path: Path) -> None:
+    path = write_film(tmp_path / "film.mkv", [0, 4], "mpeg4")
+    path.write_bytes(path.read_bytes().replace(b"V_MPEG4/ISO/ASP", b"V_QQQQQ/ISO/ASP"))
+    with pytest.raises(TrackingError, match=r"film\.mkv: .*got an unknown codec: .*; convert it to H\.264"):
+        list(read_pictures(path)[1])
+
+
+def test_an_empty_film_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("av", reason="needs the film extra")
+    (tmp_path / "film.mp4").touch()
+    with pytest.raises(TrackingError, match=r"film\.mp4: .*got an empty file"):
+        read_pictures(tmp_path / "film.mp4")
+
+
+def test_a_broken_picture_of_a_folder_is_left_out(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    for k in (1, 2, 3):
+        Image.new("RGB", (20, 20)).save(tmp_path / f"{k}.png")
+    (tmp_path / "2.png").write_bytes(b"no picture")
+    assert [picture.time for picture in read_pictures(tmp_path, 10)[1]] == [0.0, 0.2]
+    assert "2.png: wanted a picture" in caplog.text
+    for k in (1, 3):
+        (tmp_path / f"{k}.png").write_bytes(b"no picture")
+    with pytest.raises(TrackingError, match=r"3\.png"):
+        list(read_pictures(tmp_path)[1])
+
+
 def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TrackingError, match="wanted a folder of pictures"):
         read_pictures(tmp_path)
