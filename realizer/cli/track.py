@@ -169,7 +169,7 @@ def follow(
     if not people:
         raise TrackingError(
             f"{source}: wanted a face, found none in {len(times)} picture{'s' * (len(times) != 1)}; it must "
-            "be seen from the front or a little from the side, and fill at least a tenth of the height"
+            "be seen from the front or a little from the side, and be a twentieth of the picture or larger"
         )
     return times, people
 

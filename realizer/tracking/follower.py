@@ -12,6 +12,7 @@ from realizer.tracking.pictures import Picture
 from realizer.tracking.region import Region
 
 DETECT_EVERY = 15  # pictures, for people who come later
+SMALL_EVERY, SMALL_LOST = 150, 5  # pictures, for small faces; the second, while nobody is there
 SAME_PLACE = 0.35  # distance of two regions of one person in one picture, relative to their side
 NEAR = 1.5  # distance of someone who was lost and is found again, relative to the side of the face
 MAX_PEOPLE = 8
@@ -58,7 +59,8 @@ class Follower:
         for person in [p for p in self.people if p.frames and p.frames[-1] == number - 1]:
             self._add(person, landmarks(picture.image, person.region), number, here)
         if not here or number % DETECT_EVERY == 0:
-            for region in detect(picture.image):
+            small = number % (SMALL_EVERY if here else SMALL_LOST) == 0
+            for region in detect(picture.image, small):
                 if any(_distance(region, person.region) < SAME_PLACE for person in here):
                     continue
                 face = landmarks(picture.image, region, refine=True)

@@ -63,7 +63,7 @@ class Mirror:
             and (face := landmarks(picture, self._face.region)).presence >= MIN_PRESENCE
         ):
             return face
-        found = (landmarks(picture, region, refine=True) for region in detect(picture)[:1])
+        found = (landmarks(picture, region, refine=True) for region in detect(picture, small=False)[:1])
         return next((face for face in found if face.presence >= MIN_PRESENCE), None)
 
     def _sight(self, face: Landmarks, time: float) -> Sight:

@@ -144,8 +144,8 @@ def _film(path: Path) -> tuple[int, Iterator[Picture]]:
             if last is None:
                 codec = stream.codec_context.name if stream.codec_context else "an unknown codec"
                 raise TrackingError(
-                    f"{path}: wanted a film that FFmpeg can decode, got {codec}: {said}; convert it to H.264, "
-                    "or copy or record it again"
+                    f"{path}: wanted a film that FFmpeg can decode, got {codec}: {said}; convert it to "
+                    "H.264, or copy or record it again"
                 )
             if broken:
                 log.warning(

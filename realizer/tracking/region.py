@@ -39,10 +39,15 @@ class Region:
     def cut(self, picture: Image.Image, pixels: int) -> Image.Image:
         """Return the square as an upright picture; what is outside the picture is black."""
         factor = max(1, int(self.side / pixels / 1.5))
+        place = np.array([self.x, self.y])
         if factor > 1:  # or fine detail would make noise
-            picture = picture.reduce(factor)
+            reach = self.side / 2 * (abs(math.cos(self.angle)) + abs(math.sin(self.angle))) + factor
+            left, top, right, bottom = (int(v) for v in (*np.maximum(place - reach, 0), *(place + reach + 1)))
+            box = left, top, min(right, picture.width), min(bottom, picture.height)
+            if box[0] < box[2] and box[1] < box[3]:
+                picture, place = picture.reduce(factor, box), place - (left, top)
         (a, b), (c, d) = self._axes() * (self.side / pixels / factor)
-        x, y = np.array([self.x, self.y]) / factor - np.array([a + b, c + d]) * (pixels / 2)
+        x, y = place / factor - np.array([a + b, c + d]) * (pixels / 2)
         numbers = tuple(map(float, (a, b, x, c, d, y)))
         return picture.transform((pixels, pixels), Image.Transform.AFFINE, numbers, Image.Resampling.BILINEAR)
 

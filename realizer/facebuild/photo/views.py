@@ -75,7 +75,7 @@ def _read(path: Path, wanted: str) -> View:
 
 
 def _seen(image: Image, path: Path, wanted: str) -> View:
-    regions = sorted(detect(image), key=lambda region: -region.side)
+    regions = sorted(detect(image, small=False), key=lambda region: -region.side)
     if not regions:
         raise FaceError(f"{path}: wanted a face {wanted}, found none")
     count = sum(region.side > SECOND * regions[0].side for region in regions)
