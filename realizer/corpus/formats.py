@@ -79,7 +79,10 @@ def read_part(path: Path) -> Recording:
     if reader is None:
         raise CorpusError(f"{path}: wanted a file that ends in {', '.join(READERS)}, got another")
     try:
-        return reader(path.read_text("utf-8-sig"))
+        text = path.read_text("utf-8-sig")
+        if not text.strip():
+            raise ValueError("an empty file; save or copy it again")
+        return reader(text)
     except DAMAGE as error:
         raise CorpusError(
             f"{path}: wanted a file of one of the formats in docs/corpus.md, got: {error}"
@@ -123,6 +126,8 @@ def _csv(text: str) -> Recording:
         return Recording("", words=read_annotations(text))
     if head == POINT_COLUMNS or text.startswith("#"):
         moving, rest = read_points(text, names=None)
+        if not moving:
+            raise ValueError("points without a row")
         tracked = tuple(moving), np.stack(list(moving.values()), axis=1)
         try:
             fapu = fapu_of({name: place.astype(np.float32) for name, place in rest.items()})

@@ -203,7 +203,7 @@ def read_faps(text: str) -> tuple[Float64, float]:
     columns = numbers(text)
     places = [row.fap - 1 for row in faps() if row.name in columns]
     if "time" not in columns or not places:
-        raise ValueError("no column time, or no columns named as FAPs")
+        raise ValueError(f"no column time, or no columns named as FAPs, but {','.join(columns)[:80]}")
     values = np.zeros((len(columns["time"]), 68))
     values[:, places] = np.stack([columns[faps()[place].name] for place in places], axis=1)
     if not np.isfinite(values).all() or not 0 < len(values) <= MAX_FRAMES:
@@ -221,6 +221,9 @@ def numbers(text: str) -> dict[str, Float64]:
             return math.nan
 
     head, *rows = list(csv.reader(io.StringIO(text), skipinitialspace=True)) or [[]]
+    for line, row in enumerate(rows, 2):
+        if len(row) != len(head):
+            raise ValueError(f"line {line} with {len(row)} cells, where the first has {len(head)}")
     table = np.array([[number(cell) for cell in row] for row in rows]).reshape(len(rows), len(head))
     return {name: table[:, k] for k, name in enumerate(head)}
 

@@ -58,6 +58,7 @@ def read_answers(paths: Iterable[Path], key: Mapping[str, Any]) -> list[Answer]:
             to one item; with file and line.
     """
     found: dict[tuple[str, str, str], tuple[str, Answer]] = {}
+    paths = list(paths)
     for path in paths:
         for place, line in _lines(path):
             if line["study"] != key["study"]:
@@ -70,7 +71,7 @@ def read_answers(paths: Iterable[Path], key: Mapping[str, Any]) -> list[Answer]:
                 )
             found[same] = place, answer
     if not found:
-        raise TableError("wanted at least one answer, got none")
+        raise TableError(f"{', '.join(map(str, paths))}: wanted at least one answer, got none")
     return [answer for _, answer in found.values()]
 
 
@@ -78,7 +79,8 @@ def _lines(path: Path) -> Iterable[tuple[str, dict[str, str]]]:
     try:
         rows = csv.DictReader(path.read_text("utf-8-sig").splitlines(), restval="")
         if list(rows.fieldnames or ()) != list(COLUMNS):
-            raise TableError(f"{path}: wanted the columns {','.join(COLUMNS)}, got {rows.fieldnames}")
+            got = f"the columns {','.join(rows.fieldnames)[:80]}" if rows.fieldnames else "an empty file"
+            raise TableError(f"{path}: wanted answers with the columns {','.join(COLUMNS)}, got {got}")
         return [(f"{path}, line {number}", line) for number, line in enumerate(rows, 2)]
     except (OSError, UnicodeError, csv.Error) as error:
         raise TableError(f"{path}: wanted answers as CSV, got: {error}") from None

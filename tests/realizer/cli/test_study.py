@@ -55,7 +55,7 @@ def test_analyse_says_what_is_wrong_in_a_sentence(tmp_path: Path) -> None:
     for args, said in (
         ((answers,), "wanted --key DIR.key.json, got 2 keys"),
         ((answers, "--key", key), "at least one answer"),
-        ((other, "--key", key), "wanted the columns"),
+        ((other, "--key", key), "wanted answers with the columns"),
         ((answers, "--key", answers), "wanted the key of a study"),
     ):
         done = run("study", "analyse", *args, *out)

@@ -143,6 +143,14 @@ def test_merged_adds_labels_and_words_once() -> None:
     [
         ("x.doc", "", r"x\.doc: wanted a file that ends in \.csv, \.fap, \.json, \.eaf, \.textgrid"),
         ("x.csv", "a,b\n1,2\n", r"x\.csv: wanted .* in docs/corpus\.md, got: no column time"),
+        ("x.csv", "a,b\n1,2\n", r"named as FAPs, but a,b"),
+        ("x.csv", " \n", r"x\.csv: .* got: an empty file; save or copy it again"),
+        ("x.csv", "frame,point,x,y,z\n", r"x\.csv: .* got: points without a row"),
+        (
+            "x.csv",
+            "time,open_jaw\n0,1\n0.04\n",
+            r"x\.csv: .* got: line 3 with 1 cells, where the first has 2",
+        ),
         ("x.csv", "frame,AU01_r\n1\n", r"x\.csv: wanted"),
         ("x.csv", "start,end,expression,annotator\n2,1,x,y\n", r"x\.csv: wanted .*line 2: .*later end"),
         ("x.csv", "frame,point,x,y,z\n0,1,nan,0,0\n", r"x\.csv: .*finite places"),

@@ -56,6 +56,14 @@ def test_read_answers_refuses_another_table(tmp_path: Path) -> None:
             read_answers([tmp_path / name], KEY)
 
 
+def test_read_answers_names_the_empty_file(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").touch()
+    with pytest.raises(TableError, match=r"a\.csv: wanted answers with the columns .*, got an empty file"):
+        read_answers([tmp_path / "a.csv"], KEY)
+    with pytest.raises(TableError, match=r"b\.csv: wanted at least one answer, got none"):
+        read_answers(iter([write(tmp_path / "b.csv", [])]), KEY)
+
+
 def test_read_key_refuses_another_file(tmp_path: Path) -> None:
     for text in ("", "[]", "{}", json.dumps({"study": "s", "items": []})):
         (tmp_path / "k.json").write_text(text)
