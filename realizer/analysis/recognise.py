@@ -93,12 +93,24 @@ class Recogniser:
         """Return the emotion of each frame, or None, and the greatest belief."""
         return [self._best(row) for row in self.beliefs(frames, seen)]
 
-    def intervals(self, frames: Any, fps: float, seen: Bool | None = None) -> list[Interval]:
+    def intervals(
+        self, frames: Any, fps: float, seen: Bool | None = None, there: Bool | None = None
+    ) -> list[Interval]:
         """Return which emotions frames show, and when.
 
         Frames are averaged over a short window before, and what is shorter than it belongs to the interval
-        before it, or else after it, so that noise does not split an expression.
+        before it, or else after it, so that noise does not split an expression. `there` (n,) says in which
+        frames the face was seen; others are in no interval.
         """
+        if there is not None:
+            found, begin = [], 0
+            for shown, run in groupby(there.tolist()):
+                end = begin + len(list(run))
+                if shown:
+                    parts = self.intervals(frames[begin:end], fps, seen)
+                    found += [replace(p, start=p.start + begin / fps, end=p.end + begin / fps) for p in parts]
+                begin = end
+            return found
         values = np.asarray(frames, np.float64)
         window = min(max(round(self._model.window * fps), 1), len(values))
         before = window // 2

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from realizer.tracking.markers.film import Look
     from realizer.tracking.unfinished import Unfinished
 
-# The text of OUT, its rate, its FAPs, and which of them were seen.
-Tracked: TypeAlias = "tuple[str, float, Any, Any]"
+# The text of OUT, its rate, its FAPs, which of them were seen, and in which frames (None: in all).
+Tracked: TypeAlias = "tuple[str, float, Any, Any, Any]"
 POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of standard input
 
 
@@ -66,9 +66,9 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
     from realizer.core.atomic_files import write_bytes
 
     if source == "-" or (Path(source).suffix.lower() in POINTS and Path(source).is_file()):
-        text, rate, values, seen = _from_points(source, output, fps or 25.0)
+        text, rate, values, seen, there = _from_points(source, output, fps or 25.0)
     else:
-        text, rate, values, seen = _from_pictures(Path(source), output, fps, **how)
+        text, rate, values, seen, there = _from_pictures(Path(source), output, fps, **how)
     with inputs.opening(output):
         write_bytes(output, text.encode())
     if profiles is not None:
@@ -78,7 +78,7 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
             raise click.UsageError(
                 "--profiles needs feature points of MPEG-4 among the markers; see --layout"
             )
-        for part in recogniser(profiles).intervals(values, rate, seen):
+        for part in recogniser(profiles).intervals(values, rate, seen, there):
             click.echo(f"{part.start:8.2f} {part.end:8.2f} {part.emotion or '-'} {part.certainty:.2f}")
 
 
@@ -97,7 +97,7 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
         values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, source))
     times = np.arange(len(values)) / fps
     note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
-    return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen
+    return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen, None
 
 
 def _from_markers(source: Path, output: Path, fps: float | None, look: Look, face: str) -> Tracked:
@@ -112,7 +112,7 @@ def _from_markers(source: Path, output: Path, fps: float | None, look: Look, fac
         faps, seen = faps_of(markers, face) if known else (None, None)
     found = f"{len(markers.layout)} markers, {markers.seen.mean():.1%} of them seen"
     note(f"{output}: {len(markers.points)} frames, {found}")
-    return text, markers.fps, faps, seen
+    return text, markers.fps, faps, seen, None
 
 
 def _from_pictures(
@@ -152,7 +152,7 @@ def _from_pictures(
     text = FORMATS[output.suffix.lower()](recording, output.stem)
     if kept is not None:
         kept.remove()
-    return text, recording.fps, recording.faps, mask()
+    return text, recording.fps, recording.faps, mask(), recording.seen
 
 
 def follow(

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from realizer.tracking.detector import detect
-from realizer.tracking.landmarks import MIN_PRESENCE, Landmarks, landmarks
+from realizer.tracking.landmarks import MIN_PRESENCE, NEW_PRESENCE, Landmarks, landmarks
 from realizer.tracking.pictures import Picture
 from realizer.tracking.region import Region
 
@@ -64,6 +64,8 @@ class Follower:
                 if any(_distance(region, person.region) < SAME_PLACE for person in here):
                     continue
                 face = landmarks(picture.image, region, refine=True)
+                if face.presence < NEW_PRESENCE:
+                    continue
                 self._add(self._who(face.region, here), face, number, here)
         return here
 

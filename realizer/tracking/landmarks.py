@@ -21,6 +21,7 @@ POINTS, PRESENCE, TRAITS = "conv2d_21", "conv2d_31", "p_re_lu_17"
 CONTOUR, IRIS = "output_eyes_contours_and_brows", "output_iris"
 IRIS_MIDDLE = 71  # row of `Landmarks.eyes`
 MIN_PRESENCE = 0.5
+NEW_PRESENCE = 0.9  # of a face that was not there in the picture before; letters of a title reach 0.65
 # Corners of the eyes from left to right in the picture of someone who faces it: right eye outer and inner,
 # left eye inner and outer.
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)

@@ -14,7 +14,7 @@ from realizer.core.array_types import Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.tracking.detector import detect
 from realizer.tracking.files import HEAD, mask, unit_columns
-from realizer.tracking.landmarks import MIN_PRESENCE, Landmarks, landmarks
+from realizer.tracking.landmarks import MIN_PRESENCE, NEW_PRESENCE, Landmarks, landmarks
 from realizer.tracking.network import TrackingError
 from realizer.tracking.recording import QUIET
 from realizer.tracking.regressor import Measured, components, measure
@@ -64,7 +64,7 @@ class Mirror:
         ):
             return face
         found = (landmarks(picture, region, refine=True) for region in detect(picture, small=False)[:1])
-        return next((face for face in found if face.presence >= MIN_PRESENCE), None)
+        return next((face for face in found if face.presence >= NEW_PRESENCE), None)
 
     def _sight(self, face: Landmarks, time: float) -> Sight:
         seen = components([face])

@@ -121,6 +121,15 @@ def test_intervals_have_times_and_certainties() -> None:
     assert recogniser().intervals(frames[:1], 20)[0].emotion == "neutral"
 
 
+def test_intervals_leave_out_when_no_face_is_seen() -> None:
+    frames, there = np.zeros((50, 68)), np.repeat([True, False, True], [10, 20, 20])
+    found = recogniser().intervals(frames, 10, there=there)
+    assert [(part.start, part.end, part.emotion) for part in found] == [
+        (0.0, 1.0, "neutral"),
+        (3.0, 5.0, "neutral"),
+    ]
+
+
 def test_names_reject_a_face_that_shows_none_of_them() -> None:
     brows, mouth = (archetypes()[name][0].frame() for name in ("anger", "surprise"))
     mixed = np.concatenate([2 * mouth[:18], -brows[18:40], mouth[40:]])

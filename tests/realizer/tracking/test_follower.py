@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 from PIL import Image
 
-from realizer.tracking.follower import follow
+from realizer.tracking import follower
+from realizer.tracking.follower import Follower, follow
+from realizer.tracking.landmarks import Landmarks, landmarks
 from realizer.tracking.pictures import Picture
 from tests.portraits import LITERT, portrait
 
@@ -43,6 +48,23 @@ def test_follower_finds_who_comes_later() -> None:
     scenes = [scene(ada=0)] * 10 + [scene(ada=0, ben=500)] * 12
     assert sorted(map(len, people(*scenes)))[1] == 22
     assert len(people(*scenes)) == 2
+
+
+def test_follower_takes_no_new_face_that_is_not_certain(monkeypatch: pytest.MonkeyPatch) -> None:
+    sure = {"presence": 0.65}
+
+    def unsure(*given: Any, **how: Any) -> Landmarks:
+        return replace(landmarks(*given, **how), **sure)
+
+    monkeypatch.setattr(follower, "landmarks", unsure)
+    there = scene(ada=300)
+    assert people(there, there) == []
+    sure["presence"] = 0.95
+    find = Follower()
+    find(Picture(0.0, there, "test"))
+    sure["presence"] = 0.65
+    find(Picture(0.1, there, "test"))
+    assert [person.frames for person in find.people] == [[0, 1]]
 
 
 def test_follower_finds_nobody_in_an_empty_scene() -> None:
