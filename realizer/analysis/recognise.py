@@ -1,6 +1,6 @@
 """Fuzzy recognition of emotions from FAPs (Raouzaiou et al. 2002, section 5)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import groupby
@@ -10,11 +10,22 @@ from typing import Any
 import numpy as np
 
 from realizer import tables
+from realizer.animation.axis import au_row
+from realizer.animation.fap.conversion import to_fap
+from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Bool, Float64
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile, split_number
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotions import emotion_model, ring
+
+# Smiles with parted lips, which the closed one of our own joy is unlike: action units with their intensities.
+OPEN_SMILES: tuple[Mapping[int, float], ...] = (
+    {6: 0.7, 10: 0.3, 12: 0.8, 25: 1.0},
+    {6: 0.6, 10: 0.9, 12: 0.8, 25: 1.0},
+    {6: 0.8, 12: 0.8, 25: 1.0, 26: 0.8},
+)
+LEAST_MOVED = 20.0  # FAPU; a profile of action units has no smaller FAPs
 
 
 @dataclass(frozen=True)
@@ -142,15 +153,26 @@ class Recogniser:
 def recogniser(profiles: str = "own") -> Recogniser:
     """Return the recogniser of all profiles of a set, and of the neutral face.
 
-    Our own set has one profile per emotion, tried at several strengths, and includes the advanced emotions of
-    the wheel.
+    Our own set has one profile per emotion, tried at several strengths, and includes smiles that show the
+    teeth and the advanced emotions of the wheel.
     """
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
     if profiles == "own":
         blends = [place for place in ring("paul").values() if place.kind == "advanced"]
         every += [replace(wheel(place.angle), name=place.name) for place in blends]
+        every += [_profile_of(f"joy {k}", units) for k, units in enumerate(OPEN_SMILES, 1)]
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     return Recogniser([*every, Profile("neutral", profiles, {})], strengths)
+
+
+def _profile_of(name: str, units: Mapping[int, float]) -> Profile:
+    """Return the profile of action units, as wide as our own are."""
+    row = au_row({(unit, "BOTH"): intensity for unit, intensity in units.items()})
+    values = to_fap(AUFrames(np.zeros(1), row[None])).values[0].astype(np.float64)
+    spread = emotion_model().spread * np.abs(values)
+    ranges = zip(values, values - spread, values + spread, strict=True)
+    moved = {fap: (float(a), float(b)) for fap, (v, a, b) in enumerate(ranges, 1) if abs(v) >= LEAST_MOVED}
+    return Profile(name, "own", moved)
 
 
 def emotion_of(name: str) -> str:

@@ -8,6 +8,9 @@ import pytest
 from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import faps_from_points
 from realizer.analysis.recognise import Recogniser, emotion_of, recogniser
+from realizer.animation.axis import au_row
+from realizer.animation.fap.conversion import to_fap
+from realizer.animation.frames import AUFrames
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
 from realizer.emotions.words import emotion, known_words
@@ -119,6 +122,15 @@ def test_intervals_have_times_and_certainties() -> None:
     assert recogniser().intervals(frames[19:], 20)[0].emotion == "joy"
     assert abs(next(i.start for i in found if i.emotion == "fear") - 2.5) <= 0.15
     assert recogniser().intervals(frames[:1], 20)[0].emotion == "neutral"
+
+
+@pytest.mark.parametrize(
+    "units", [{6: 0.5, 12: 0.7, 25: 0.8}, {6: 0.8, 12: 0.9, 25: 1.0, 26: 0.6}, {10: 0.7, 12: 0.6, 25: 0.8}]
+)
+def test_names_call_a_smile_that_shows_the_teeth_joy(units: dict[int, float]) -> None:
+    row = au_row({(unit, "BOTH"): value for unit, value in units.items()})
+    frames = to_fap(AUFrames(np.zeros(1), row[None])).values
+    assert recogniser().names(frames) == ["joy"]
 
 
 def test_intervals_leave_out_when_no_face_is_seen() -> None:
