@@ -12,12 +12,13 @@ from realizer.facebuild.photo.views import View
 from realizer.tables import toml_table
 
 CHEEKS = (50, 280, 205, 425, 101, 330, 118, 347, 151, 9)  # landmarks on plain skin
-TOP, CHIN, JAW, ASIDE = 10, 152, (132, 361), (234, 454)
+TOP, CHIN, JAW, ASIDE, TEMPLES = 10, 152, (132, 361), (234, 454), (127, 356)
 # Light that a picture shows beside the skin's own colour, by channel, as measured on drawings of our faces.
 SHOWN = np.array([0.97, 0.91, 0.83])
 ABOVE = (0.10, 0.16, 0.22)  # heights of the face above its uppermost landmark at which hair is looked for
 BESIDE = (0.18, 0.25, 0.32)  # widths of the face beside the jaw
 ALIKE = 0.35  # distance of the logarithms of colours; those further apart are not of the same thing
+TEMPLE = 0.06  # heights of the face above the landmark at the temple at which a rim of hair is looked for
 PATCH = 4  # pixels around a place
 ON_SKIN = ("skin", "blush", "lips", "corner")  # colours that go with the skin's
 
@@ -43,9 +44,10 @@ def recipe_of(
     tone = int(np.linalg.norm(fine - skin, axis=1).argmin())
     up = points[TOP] - points[CHIN]
     found = np.median([_colour(pixels, points[TOP] + share * up) for share in ABOVE], axis=0)
+    rim = _rim(pixels, points, skin) if _apart(found, skin) < ALIKE else None
     seen = {
         "skin": round(tone / 199, 3),
-        "hair": _nearest(found, _hairs()),
+        "hair": _nearest(found if rim is None else rim, _hairs()),
         "eyes": _nearest(_iris(pixels, front), _eyes()),
     }
     sliders = {**person, **seen, **told}
@@ -54,7 +56,7 @@ def recipe_of(
     colours = {
         name: np.rint(255 * srgb(linear(np.array(tables["colours"][name])) * share)) for name in ON_SKIN
     }
-    style = hair or _style(pixels, points, found, skin, sliders["sex"])
+    style = hair or ("rim" if rim is not None else _style(pixels, points, found, skin, sliders["sex"]))
     return {
         "says": f"A face made of two photographs, with {sliders['hair']} hair",
         "person": sliders,
@@ -93,6 +95,15 @@ def _nearest(colour: Float64, known: Mapping[str, Any]) -> str:
 
 def _apart(one: Float64, other: Float64) -> float:
     return float(np.linalg.norm(np.log(linear(one) + 0.02) - np.log(linear(other) + 0.02)))
+
+
+def _rim(pixels: Float64, points: Float64, skin: Float64) -> Float64 | None:
+    """Return the colour of hair beside the temples, on the side in the light, or None if skin is there."""
+    up, wide = points[TOP] - points[CHIN], points[ASIDE[1]] - points[ASIDE[0]]
+    sides = [points[k] + TEMPLE * up for k in TEMPLES]
+    side, way = max(zip(sides, (-1, 1), strict=True), key=lambda one: _colour(pixels, one[0]).sum())
+    seen, behind = _colour(pixels, side), _colour(pixels, side + way * BESIDE[0] * wide)
+    return seen if min(_apart(seen, skin), _apart(seen, behind)) >= ALIKE else None
 
 
 def _style(pixels: Float64, points: Float64, hair: Float64, skin: Float64, sex: float) -> str:

@@ -48,6 +48,16 @@ def test_recipe_has_the_likeliest_hair(hair: str, long: bool, sex: float, style:
     assert tables["hair"] == {"style": style, "grey": 0.0}
 
 
+def test_recipe_of_a_bald_head_has_the_hair_beside_its_temples() -> None:
+    view = pictured("#e8c0a0", "#e0ba9c", "#382010")
+    assert view.points is not None
+    draw = ImageDraw.Draw(view.image)
+    for x, y in view.points[[127, 356]]:
+        draw.rectangle((x - 14, y - 60, x + 14, y + 10), fill="#6e6a68")
+    tables = recipe_of(view, {"sex": 1.0}, {}, None)
+    assert (tables["hair"]["style"], tables["person"]["hair"]) == ("rim", "grey")
+
+
 def test_recipe_keeps_what_is_told() -> None:
     told = {"hair": "red", "eyes": "green", "age": 30}
     tables = recipe_of(pictured("#e8c0a0", "#2a2422", "#382010"), {"age": 50.0, "sex": 0.2}, told, "long")
