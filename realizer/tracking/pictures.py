@@ -152,7 +152,9 @@ def _film(path: Path) -> tuple[int, Iterator[Picture]]:
                     "%s: parts of it are broken, %d in all (%s); the rest is kept", path, len(broken), said
                 )
             if last - first < length - EARLY:
-                log.warning("%s: its pictures end at %.1f of %.1f s; it may be cut off", path, last, length)
+                log.warning(
+                    "%s: its pictures end at %.1f of %.1f s; it may be cut off", path, last - first, length
+                )
 
     return count, frames()
 
