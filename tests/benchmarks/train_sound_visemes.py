@@ -2,7 +2,7 @@
 
 The files are written by `viseme_frames.py`. Each time a sentence is used, it comes from another throat,
 through another microphone, in another noise and level. The network is a perceptron; Adam minimises its
-cross-entropy, in which rare classes weigh more. With JAX and a GPU it takes minutes: `pip install jax`.
+cross-entropy, in which rare classes weigh more. It needs JAX (`pip install jax`).
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from realizer.speech.sound_visemes.recogniser import FLOOR, FUTURE, OFFSETS, PAS
 NOT_SEEN = -1  # the class of sounds without a shape of the lips, such as h
 HIDDEN = (896, 512, 256)
 LENGTH = 480  # frames at most that are used together
+STRIDE = 8  # from one frame of a sentence that is used at a time to the next
 EPOCHS, STEP, TOGETHER, TESTED = 120, 1e-3, 32, 8
 DROPPED = 0.2  # of the hidden units in training
 DECAY = 0.02  # of the weights
@@ -90,15 +91,14 @@ def followed(log: Any) -> tuple[Any, Any]:
     return level, total / count[:, None]
 
 
-def inputs(key: Any, log: Any, vary: bool) -> Any:
-    """Return the inputs (n - FUTURE, frames x BANDS) of a sentence (n, BANDS)."""
+def inputs(key: Any, log: Any, rows: Any, vary: bool) -> Any:
+    """Return the inputs (rows, frames x BANDS) of a sentence (n, BANDS), at `rows` below n - FUTURE."""
     keys = jax.random.split(key, 4)
     log = changed(keys[0], log) if vary else log
     level, mean = followed(log)
     padded = jnp.concatenate([jnp.full((PAST, BANDS), SILENT), log])
-    rows = np.arange(LENGTH - FUTURE)[:, None]
-    near = padded[rows + PAST + OFFSETS]
-    loud = jnp.maximum(near - level[FUTURE:, None, None], -FLOOR) - mean[FUTURE:, None]
+    near = padded[rows[:, None] + PAST + OFFSETS]
+    loud = jnp.maximum(near - level[rows + FUTURE, None, None], -FLOOR) - mean[rows + FUTURE, None]
     if vary:
         first, width = jax.random.uniform(keys[1]) * BANDS, jax.random.uniform(keys[2]) * HIDDEN_BANDS
         at = np.arange(BANDS)
@@ -150,11 +150,21 @@ def batch(
     log: Any, labels: Any, step: Any, starts: Any, lengths: Any, key: Any, vary: bool
 ) -> tuple[Any, Any]:
     """Return inputs (k, n, m) and labels (k, n) of sentences; `NOT_SEEN` after their ends."""
-    rows = jnp.minimum(starts[:, None] + np.arange(LENGTH), len(labels) - 1)
+    places = jnp.minimum(starts[:, None] + np.arange(LENGTH), len(labels) - 1)
     inside = np.arange(LENGTH) < lengths[:, None]
-    frames = jnp.where(inside[..., None], log[rows] * step + SILENT, SILENT)
-    found = jax.vmap(lambda k, one: inputs(k, one, vary))(jax.random.split(key, len(starts)), frames)
-    seen = jnp.where(inside[:, FUTURE:], labels[rows[:, : LENGTH - FUTURE]], NOT_SEEN)
+    frames = jnp.where(inside[..., None], log[places] * step + SILENT, SILENT)
+    each = LENGTH - FUTURE
+    if vary:  # neighbours are alike: a part of them teaches nearly as much
+        each //= STRIDE
+        first = jax.random.randint(jax.random.fold_in(key, 2), (len(starts), 1), 0, STRIDE)
+        rows = first + STRIDE * np.arange(each)
+    else:
+        rows = jnp.broadcast_to(jnp.arange(each), (len(starts), each))
+    found = jax.vmap(lambda *one: inputs(*one, vary))(jax.random.split(key, len(starts)), frames, rows)
+    at = rows + FUTURE
+    seen = jnp.where(
+        jnp.take_along_axis(inside, at, axis=1), labels[jnp.take_along_axis(places, rows, axis=1)], NOT_SEEN
+    )
     return found, seen
 
 

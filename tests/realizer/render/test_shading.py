@@ -46,7 +46,7 @@ def test_reflected_light_is_less_in_shadow_and_in_cavities(kind):
     assert (light(kind, values=(0.2, 0.5, 1, 1)) < whole).all()
 
 
-def test_reflected_light_scatters_into_shadow_where_nothing_hides_the_surface():
+def test_reflected_light_scatters_into_shadow_of_surfaces_that_are_open():
     lit, shaded, hidden = (light(WET, values=(open_, 0.5, 1, s)) for open_, s in ((1, 1), (1, 0), (0.1, 0)))
     assert shaded == pytest.approx(surfaces()[WET, SHADED] * lit)
     assert (hidden < 0.2 * shaded).all()
