@@ -14,8 +14,9 @@ from realizer.scheduling.rigid_clusters import least_squares
 
 # Active sets tried before the interior point method, which is rarely needed.
 GUESSES = 12
-# One that is wrong about so many inequalities after that many guesses rarely converges.
-WRONG, AFTER = 24, 4
+# A guess that is wrong about more inequalities than this, and about half as many as the one before or more,
+# rarely leads to the right one.
+WRONG = 24
 # Corrections of the active set after the interior point method; mostly one is enough.
 ROUNDS = 20
 # Up to this many unknowns a thread costs more time than it leaves to others.
@@ -70,14 +71,15 @@ def active_set(quadratic: Quadratic, x: Float64) -> Float64 | None:
         return None
     binding = (x[v] - x[u] < w - TIGHT) & differ
     seen: list[bytes] = []
-    for guess in range(1, GUESSES + 1):
+    wrong = len(u)
+    for _ in range(GUESSES):
         exact, force = _bound(quadratic, binding, x)
         broken = (exact[v] - exact[u] < w - TIGHT) & differ
         misplaced = broken | (force < -RESTS * quadratic.stiffness.max(initial=0.0))
-        wrong = np.count_nonzero(misplaced)
+        before, wrong = wrong, int(misplaced.sum())
         if not wrong:
             return exact
-        if guess == AFTER and wrong > WRONG:
+        if wrong > max(WRONG, before // 2):
             return None
         binding = (binding & ~misplaced) | broken
         # The same guess may be worth a second try, because it starts from another x.
@@ -245,6 +247,8 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     cones = [clarabel.NonnegativeConeT(len(rows))]
     settings = clarabel.DefaultSettings()
     settings.verbose = False
+    # It only makes the solution more accurate than is needed.
+    settings.iterative_refinement_enable = False
     # Close enough to tell active inequalities from those that are merely near.
     settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
     # Matrices of -1, 0 and 1 do not need Clarabel's scaling, which sometimes makes it fail; in rare cases it
