@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush, heappushpop
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from math import inf
 from typing import TypeAlias
 
@@ -94,11 +94,8 @@ class ConstraintNetwork:
         work.count(3 * steps)
         return []
 
-    def remove(self, links: Iterable[Link], unused: range = range(0)) -> None:
-        """Remove inequalities that are there, and lower the times that followed from them.
-
-        Times of `unused` points, which will be isolated, need not be right.
-        """
+    def remove(self, links: Iterable[Link]) -> None:
+        """Remove inequalities that are there, and lower the times that followed from them."""
         lowered = []
         for link in links:
             if link in self._out[link.u]:
@@ -109,8 +106,6 @@ class ConstraintNetwork:
             work.count()
             self._level[point], self._cause[point] = -inf, None
             lowered += [v for _, v, _, reason in self._steps_from(point) if self._cause[v] is reason]
-        if all(point in unused for point in lowered):
-            return
         queue = deque(step for point in dict.fromkeys(lowered) for step in self._steps_to(point))
         while queue:
             work.count()
@@ -168,13 +163,21 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     Relations are added in the order of the document. One that contradicts those before is a conflict, and
     the part that `choose` drops is removed with all that refers to it. If it drops nothing, the search ends.
     """
-    network = ConstraintNetwork(len(problem.owner))
-    _add_lengths(network, problem)
-    number = {part: n for n, part in enumerate(problem.behaviours)}
     relations = problem.equalities + problem.orders
-    links = defaultdict[Part, list[Link]](list)  # of the present parts
+    named = {p for relation in relations for p in relation[:2]}
+    # Of the others, only those of behaviours with greatest lengths are in the network.
+    for timing, first in zip(problem.timings, problem.first, strict=True):
+        named.update((first,) if timing.most is None else range(first, first + len(timing.points)))
+    points = sorted({ORIGIN, *named})
+    place = {p: k for k, p in enumerate(points)}
+    begins = [*(place[first] for first in problem.first), len(points)]
+    network = ConstraintNetwork(len(points))
+    _add_lengths(network, problem, points, begins)
+    number = {part: n for n, part in enumerate(problem.behaviours)}
+    links: dict[Part, list[Link]] = {}  # of the present constraints
     constraints: dict[str, list[Part]] = {}  # that name a behaviour
     for part in dict.fromkeys(r.part for r in relations if r.part.is_constraint):
+        links[part] = []
         for name in part.names:
             constraints.setdefault(name, []).append(part)
     gone: set[Part] = set()
@@ -183,32 +186,32 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
 
     def drop(part: Part) -> None:
         gone.add(part)
-        own = links.pop(part, ())
-        if (n := number.get(part)) is None:
-            network.remove(own)
-            return
-        absent.add(n)
-        points = range(problem.first[n], problem.first[n] + len(problem.timings[n].points))
-        network.remove(own, points)
-        network.isolate(points)
-        for constraint in constraints.get(part.id, ()):
-            gone.add(constraint)
-            network.remove(links.pop(constraint, ()))
+        network.remove(links.pop(part, ()))
+        if (n := number.get(part)) is not None:
+            absent.add(n)
+            network.isolate(range(begins[n], begins[n + 1]))
+            for constraint in constraints.get(part.id, ()):
+                drop(constraint)
 
     for k, relation in enumerate(work.counted(relations, 2)):
         u, v, seconds, part, _ = relation
+        ends = problem.owner[u], problem.owner[v]
+        u, v = place[u], place[v]
         if k < len(problem.equalities):  # time[u] = time[v] + seconds
             pair = [Link(v, u, seconds, relation), Link(u, v, -seconds, relation)]
         else:
             pair = [Link(u, v, seconds, relation)]
-        ends = problem.owner[u], problem.owner[v]
         for link in pair:
             while part not in gone and absent.isdisjoint(ends):
                 cycle = network.add(link)
                 if not cycle:
-                    links[part].append(link)
+                    if part.is_constraint:
+                        links[part].append(link)
                     break
-                conflict = conflict_of(problem, cycle)
+                conflict = conflict_of(
+                    problem,
+                    [step.order or Link(points[step.u], points[step.v], step.seconds) for step in cycle],
+                )
                 conflicts.append(conflict)
                 dropped = choose(conflict)
                 if dropped is None:
@@ -217,23 +220,27 @@ def conflicts_of(problem: Problem) -> list[Conflict]:
     return conflicts
 
 
-def _add_lengths(network: ConstraintNetwork, problem: Problem) -> None:
-    """Add the inequalities that behaviours state by themselves: their lengths and earliest starts."""
-    ties, tied = UnionFind(len(problem.owner)), dict[int, set[int]]()
+def _add_lengths(
+    network: ConstraintNetwork, problem: Problem, points: Sequence[int], begins: Sequence[int]
+) -> None:
+    """Add the inequalities that behaviours state by themselves: their lengths and earliest starts.
+
+    The network has some of the points; those of behaviour b are from number begins[b] on.
+    """
+    ties = UnionFind(len(problem.owner))
     for u, v, seconds, _, _ in work.counted(problem.equalities):
         ties.tie(u, v, seconds)
-        for p in (u, v):
-            tied.setdefault(problem.owner[p], set()).add(p)
     for b, (timing, first) in enumerate(work.counted(zip(problem.timings, problem.first, strict=True), 5)):
+        begin, places = begins[b], [p - first for p in points[begins[b] : begins[b + 1]]]
         if timing.rigid:
-            network.add_chain(first, problem.earliest[b], ())
+            network.add_chain(begin, problem.earliest[b], ())
             continue
         least, most = timing.arrays.least, timing.arrays.most
-        if most is None and len(points := tied.get(b, ())) > 1:
+        if most is None and len(places) > 1:
             stated = list(least)
-            drop_least_gaps(stated, [(p - first, (ties.find(p), ties.shift[p])) for p in sorted(points)])
+            drop_least_gaps(stated, [(i, (ties.find(first + i), ties.shift[first + i])) for i in places])
             least = tuple(stated)
-        network.add_chain(first, problem.earliest[b], least)
-        for p, seconds in enumerate(most or (), first):
+        network.add_chain(begin, problem.earliest[b], [sum(least[i:j]) for i, j in pairwise(places)])
+        for k, seconds in enumerate(most or (), begin):
             if seconds < inf:
-                network.add(Link(p + 1, p, -seconds))
+                network.add(Link(k + 1, k, -seconds))
