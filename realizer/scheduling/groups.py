@@ -147,14 +147,10 @@ def solve_groups(
 def _feasible(
     model: Model, clusters: RigidClusters, groups: Sequence[Group]
 ) -> tuple[_GroupProblem, Float64, list[Link]]:
-    """Return the problem of some groups, some least gaps dropped, and positions; or a cycle of links."""
-    while True:
-        problem = _group_problem(model, clusters, groups)
-        level, cycle = feasible_start(problem.quadratic, problem.start(clusters))
-        if not cycle:
-            return problem, level, []
-        if not _yield_to_stated(model, problem.gaps):
-            return problem, level, [problem.link(model, k) for k in cycle]
+    """Return the problem of some groups, with positions that satisfy its inequalities, or a cycle."""
+    problem = _group_problem(model, clusters, groups)
+    level, cycle = feasible_start(problem.quadratic, problem.start(clusters))
+    return problem, level, [problem.link(model, k) for k in cycle or ()]
 
 
 def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group]) -> _GroupProblem:
@@ -172,6 +168,7 @@ def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group
     number[nodes] = np.arange(1, len(nodes) + 1)
 
     gaps = np.flatnonzero(chosen[owner[model.gap]])
+    _yield_to_stated(model, gaps)
     orders = [order for group in groups for order in group.orders]
     starts = model.first[held[:-1]]
     begin, g = model.gap[gaps], len(gaps)
@@ -209,16 +206,14 @@ def _anchor(model: Model, group: Group) -> int:
     return int(model.root[model.first[group.clusters[0]]])
 
 
-def _yield_to_stated(model: Model, gaps: Index) -> bool:
+def _yield_to_stated(model: Model, gaps: Index) -> None:
     """Drop the least gaps within a length that the document states, except in bounded behaviours."""
-    changed = False
-    tied, owner, root = model.tied, model.owner, model.root
-    tied = tied[np.lexsort((tied, root[tied], owner[tied]))]
-    p, q = tied[:-1], tied[1:]
+    owner = model.owner
+    p, q, length = model.stated_lengths()
     least = np.zeros(len(owner))
     least[model.gap + 1] = model.least
-    room, length = np.cumsum(least)[[p, q]], model.shift[q] - model.shift[p]
-    short = (length >= -LOOSE) & (length < room[1] - room[0]) & (owner[p] == owner[q]) & (root[p] == root[q])
+    room = np.cumsum(least)[[p, q]]
+    short = (length >= -LOOSE) & (length < room[1] - room[0])
     owners, firsts = np.unique(owner[model.gap[gaps]], return_index=True)
     named = np.isin(owners, owner[p[short]])
     begins = zip(owners[named].tolist(), gaps[firsts[named]].tolist(), strict=True)
@@ -230,7 +225,5 @@ def _yield_to_stated(model: Model, gaps: Index) -> bool:
         classes = zip(
             model.root[first : last + 1].tolist(), model.shift[first : last + 1].tolist(), strict=True
         )
-        if drop_least_gaps(own, enumerate(classes)):
-            model.least[k : k + last - first] = own
-            changed = True
-    return changed
+        drop_least_gaps(own, enumerate(classes))
+        model.least[k : k + last - first] = own

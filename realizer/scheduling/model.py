@@ -50,6 +50,14 @@ class Model:
         """Return the points of chosen behaviours; chosen is (B + 1,) bool, with its last entry False."""
         return np.flatnonzero(chosen[self.owner])
 
+    def stated_lengths(self) -> tuple[Index, Index, Float64]:
+        """Return successive tied points of behaviours that have one root, and the seconds between them."""
+        tied = self.tied[np.lexsort((self.tied, self.root[self.tied], self.owner[self.tied]))]
+        p, q = tied[:-1], tied[1:]
+        same = (self.owner[p] == self.owner[q]) & (self.root[p] == self.root[q])
+        p, q = p[same], q[same]
+        return p, q, self.shift[q] - self.shift[p]
+
 
 def model_of(problem: Problem) -> Model | list[int]:
     """Return the problem as arrays, or the numbers of the equalities that contradict those before them."""
@@ -115,21 +123,18 @@ def model_of(problem: Problem) -> Model | list[int]:
     )
 
 
-def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, float]]]) -> bool:
-    """Drop least gaps of a behaviour, in place, within a shorter stated length; return whether it has any.
+def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, float]]]) -> None:
+    """Drop least gaps of a behaviour, in place, within a shorter stated length.
 
     `points` are (place in the behaviour, (root, shift)) in order; those that no equality names may be absent.
     """
-    changed = False
     seen: dict[int, tuple[int, float]] = {}
     for place, (root, shift) in points:
         if root in seen:
             begin, before = seen[root]
             if -LOOSE <= shift - before < sum(least[begin:place]) - TIGHT:
                 least[begin:place] = [0.0] * (place - begin)
-                changed = True
         seen[root] = place, shift
-    return changed
 
 
 def _along(gap: Index, length: Float64, first: Index, owner: Index) -> Float64:

@@ -46,7 +46,8 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
     if isinstance(model, list) and is_small:
         graph = ConstraintGraph(problem, model)
         return [graph.loop(k) for k in model]
-    if isinstance(model, list):
+    # What is impossible by itself is found before anything is solved together.
+    if isinstance(model, list) or (not is_small and (model.stated_lengths()[2] < -LOOSE).any()):
         return _all_conflicts(problem)
     work.count(len(problem.owner) // 4)
     clusters = clusters_of(model)

@@ -43,6 +43,12 @@ def test_points_of_chosen_behaviours() -> None:
     assert found.points_of(np.array([False, True, False])).tolist() == [4, 5, 6]
 
 
+def test_stated_lengths_are_those_between_fixed_points_of_a_behaviour() -> None:
+    numbers = [((0, 2), 4.0), ((0, 0), 1.0), ((1, 1), 2.0)]
+    p, q, length = model(Recipe([FREE, FREE], [], [], numbers)).stated_lengths()
+    assert (p.tolist(), q.tolist(), length.tolist()) == ([1], [3], [3.0])
+
+
 @given(possible())
 def test_model_of_a_problem_that_can_be_solved_keeps_it(recipe: Recipe) -> None:
     problem, found = built(recipe), model(recipe)
