@@ -173,8 +173,9 @@ class _PlanBuilder:
                 self.refuse(warnings[0])
             unscheduled = self.timings.keys() - schedule.times.keys()
             lost_constraints = [self.block.constraints[n] for n in schedule.lost_constraints]
-            self.drop([(self.behaviour_of(w), w) for w in warnings if self.behaviour_of(w) in unscheduled])
-            about_constraints = [w for w in warnings if self.behaviour_of(w) not in unscheduled]
+            about = [(self.behaviour_of(w), w) for w in warnings]
+            self.drop([(id, w) for id, w in about if id in unscheduled])
+            about_constraints = [w for id, w in about if id not in unscheduled]
             character, all_warnings = self.block.character_id, (*self.warnings, *about_constraints)
             schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
             self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from realizer.core import work
@@ -36,7 +35,7 @@ class Link:
     order: Relation | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True, eq=False)
 class Conflict:
     """A minimal set of relations that cannot hold together."""
 
@@ -46,26 +45,26 @@ class Conflict:
     earliest: tuple[Part, str, float] | None = None
     named: tuple[Part, ...] = ()  # the behaviours of the points, also those that state none of the relations
 
-    @cached_property
-    def parts(self) -> list[Part]:
-        """The parts that state the relations and gaps, each once."""
-        return list(dict.fromkeys([r.part for r in self.relations] + [g.part for g in self.gaps]))
+    parts: list[Part] = field(init=False)  # that state the relations and gaps, each once
 
-    @cached_property
+    def __post_init__(self) -> None:
+        self.parts = list(dict.fromkeys([*(r.part for r in self.relations), *(g.part for g in self.gaps)]))
+
+    @property
     def candidates(self) -> list[Part]:
         """The parts of which one can be dropped, by kind; none if everything is required."""
         optional = [part for part in self.parts if not part.required]
         constraints = [part for part in optional if part.is_constraint]
         return constraints or optional or [part for part in self.named if not part.required]
 
-    @cached_property
-    def clauses(self) -> list[tuple[Part, Clause]]:
+    @property
+    def clauses(self) -> dict[Clause, Part]:
         """What the conflict consists of, in the order of its chain, and which part states it."""
-        texts = [(r.part, _relation(r)) for r in self.relations] + [(g.part, _gap(g)) for g in self.gaps]
-        found = [(part, Clause(part.id, part.line, text)) for part, text in texts]
+        found = {Clause(r.part.id, r.part.line, _relation(r)): r.part for r in self.relations}
+        found |= {Clause(g.part.id, g.part.line, _gap(g)): g.part for g in self.gaps}
         if self.earliest is not None:
             part, point, seconds = self.earliest
-            found.append((part, Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")))
+            found[Clause(part.id, None, f"{point} is not before {_seconds(seconds)}")] = part
         return found
 
     @property
@@ -175,19 +174,19 @@ def choose(clash: Conflict) -> Part | None:
 
 
 def warning_of(clash: Conflict, dropped: Part) -> Warning:
-    name = dropped.name or "a constraint"
+    name, clauses = dropped.name, clash.clauses
+    words = in_words(clauses)
     if dropped.is_constraint:
-        name = f"constraint {dropped.name}" if dropped.name else "a constraint without an id"
-        text = f"{name} cannot be kept: {in_words(clash)}; a constraint that is not required gives way first"
+        name = f"constraint {name}" if name else "a constraint without an id"
+        text = f"{name} cannot be kept: {words}; a constraint that is not required gives way first"
     else:
-        reason = _reason(clash, dropped)
-        text = f"{name} cannot be placed: {in_words(clash)}; {name} was dropped because {reason}"
-    return Warning(dropped.id, IMPOSSIBLE, text, _unique(clash), dropped.is_constraint)
+        text = f"{name} cannot be placed: {words}; {name} was dropped because {_reason(clash, dropped)}"
+    return Warning(dropped.id, IMPOSSIBLE, text, tuple(clauses), dropped.is_constraint)
 
 
 def refusal(block: str, clash: Conflict) -> Warning:
-    text = f"{in_words(clash)}, and all of this is required"
-    return Warning(block, IMPOSSIBLE, text, _unique(clash))
+    text = f"{in_words(clash.clauses)}, and all of this is required"
+    return Warning(block, IMPOSSIBLE, text, tuple(clash.clauses))
 
 
 def fault_warning(part: Part, text: str) -> Warning:
@@ -197,17 +196,13 @@ def fault_warning(part: Part, text: str) -> Warning:
     return Warning(part.id, IMPOSSIBLE, said, constraint=part.is_constraint)
 
 
-def in_words(clash: Conflict) -> str:
-    """Return the conflict as the clauses of one sentence, in the order of their chain."""
-    unique = list(dict.fromkeys(f"{c.text}{_placed(part, c.line)}" for part, c in clash.clauses))
+def in_words(clauses: Mapping[Clause, Part]) -> str:
+    """Return a conflict as the clauses of one sentence, in the order of their chain."""
+    unique = list(dict.fromkeys([f"{c.text}{_placed(part, c.line)}" for c, part in clauses.items()]))
     quantity = "all " if len(unique) > 2 else "both " if len(unique) > 1 else ""
     if len(unique) > MAX_CLAUSES:
         unique[MAX_CLAUSES - 1 :] = [f"{len(unique) - MAX_CLAUSES + 1} more such things"]
     return f"{_join(unique)} cannot {quantity}hold"
-
-
-def _unique(clash: Conflict) -> tuple[Clause, ...]:
-    return tuple(dict.fromkeys(clause for _, clause in clash.clauses))
 
 
 def _reason(clash: Conflict, dropped: Part) -> str:
@@ -228,10 +223,10 @@ def _relation(relation: Relation) -> str:
 
 
 def _placed(part: Part, line: int | None) -> str:
-    words = [f"constraint {part.name}".strip()] if part.is_constraint else []
-    if line is not None:
-        words.append(f"line {line}")
-    return f" ({', '.join(words)})" if words else ""
+    place = "" if line is None else f"line {line}"
+    if part.is_constraint:
+        place = ", ".join(filter(None, (f"constraint {part.name}".strip(), place)))
+    return f" ({place})" if place else ""
 
 
 def _gap(gap: LengthBound) -> str:

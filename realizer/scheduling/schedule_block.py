@@ -63,9 +63,11 @@ def schedule_together(
                 break
             shifts = {behaviour: by for behaviour, by in shifts.items() if late[behaviour] not in too_late}
             outcome = in_time
-    warnings = tuple(
-        _with_lateness(w, late.get(w.id.removeprefix(f"{new.id}:"), 0.0), grace) for w in outcome.warnings
-    )
+    warnings = tuple(outcome.warnings)
+    if late:
+        warnings = tuple(
+            _with_lateness(w, late.get(w.id.removeprefix(f"{new.id}:"), 0.0), grace) for w in warnings
+        )
     if outcome.solution is None:
         return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
     problem, found = outcome.problem, outcome.solution
@@ -202,15 +204,13 @@ def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warnin
     clashes = solve(problem)
     if isinstance(clashes, Solution):
         return clashes
-    drops: list[tuple[Part, Warning]] = []
-    dropped: set[int] = set()
+    drops: dict[Part, Warning] = {}
     for clash in work.counted(clashes, 20):
         # A conflict that a drop of this round may have settled is examined again in the next.
-        if any(id(part) in dropped for part in (*clash.parts, *clash.named)):
+        if not (drops.keys().isdisjoint(clash.parts) and drops.keys().isdisjoint(clash.named)):
             continue
         part = choose(clash)
         if part is None:
             return refusal(block, clash)
-        dropped.add(id(part))
-        drops.append((part, warning_of(clash, part)))
-    return drops
+        drops[part] = warning_of(clash, part)
+    return list(drops.items())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -86,8 +86,7 @@ class Timing:
         )
 
 
-@dataclass(frozen=True)
-class Clause:
+class Clause(NamedTuple):
     """One clause of a conflict: a statement or gap in words, with its line."""
 
     id: str
@@ -95,7 +94,7 @@ class Clause:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Warning:  # the standard's word
     """One BML warning: `id` is a block, "block:behaviour" or "block:constraint", `type` the standard's.
 
@@ -112,7 +111,7 @@ class Warning:  # the standard's word
         """Return {"id", "type", "text"}, and "clash": [{"id", "line", "text"}] if there is one."""
         known: dict[str, Any] = {"id": self.id, "type": self.type, "text": self.text}
         if self.clash:
-            known["clash"] = [asdict(clause) for clause in self.clash]
+            known["clash"] = [clause._asdict() for clause in self.clash]
         return known
 
 

@@ -139,10 +139,10 @@ def test_warning_of_gives_the_reason(others: list[Part], reason: str) -> None:
 
 
 def test_in_words_of_a_long_chain_counts_what_it_leaves_out() -> None:
-    text = in_words(conflict(*(behaviour(f"n{k}") for k in range(40))))
+    text = in_words(conflict(*(behaviour(f"n{k}") for k in range(40))).clauses)
     assert [k for k in range(40) if f"n{k}:start" in text] == list(range(29))
     assert text.endswith("n28:start = 1 and 11 more such things cannot all hold")
-    assert "more" not in in_words(conflict(*(behaviour(f"n{k}") for k in range(30))))
+    assert "more" not in in_words(conflict(*(behaviour(f"n{k}") for k in range(30))).clauses)
 
 
 def test_warning_of_names_a_constraint_with_its_id() -> None:
@@ -153,9 +153,9 @@ def test_warning_of_names_a_constraint_with_its_id() -> None:
 
 def test_in_words_counts_what_cannot_hold() -> None:
     a, b, c = (behaviour(name) for name in "abc")
-    assert in_words(conflict(a)) == "a:start = 1 cannot hold"
-    assert in_words(conflict(a, b)) == "a:start = 1 and b:start = 1 cannot both hold"
-    assert in_words(conflict(a, b, c)) == "a:start = 1, b:start = 1 and c:start = 1 cannot all hold"
+    assert in_words(conflict(a).clauses) == "a:start = 1 cannot hold"
+    assert in_words(conflict(a, b).clauses) == "a:start = 1 and b:start = 1 cannot both hold"
+    assert in_words(conflict(a, b, c).clauses) == "a:start = 1, b:start = 1 and c:start = 1 cannot all hold"
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_in_words_counts_what_cannot_hold() -> None:
 )
 def test_in_words_of_a_gap(seconds: float, most: bool, words: str) -> None:
     gap = LengthBound(behaviour("a"), "start", "end", seconds, most)
-    assert in_words(conflict(gaps=(gap,))) == f"{words} cannot hold"
+    assert in_words(conflict(gaps=(gap,)).clauses) == f"{words} cannot hold"
 
 
 def test_refusal_is_of_the_block() -> None:

@@ -73,10 +73,10 @@ def test_minimal_cycles_can_hold_without_any_one_statement(recipe: Recipe) -> No
     for clash in clashes[:2]:
         said = statements(problem, clash)
         assert len(said) == clash.statements
-        assert not can_hold(n, (edge for edges in said for edge in edges)), in_words(clash)
+        assert not can_hold(n, (edge for edges in said for edge in edges)), in_words(clash.clauses)
         for left_out in range(len(said)):
             rest = (edge for k, edges in enumerate(said) if k != left_out for edge in edges)
-            assert can_hold(n, rest), f"{in_words(clash)}; number {left_out} has no part in it"
+            assert can_hold(n, rest), f"{in_words(clash.clauses)}; number {left_out} has no part in it"
 
 
 def ways(problem: Problem) -> Float64:
@@ -114,7 +114,7 @@ def test_minimal_cycles_have_the_fewest_statements_at_their_points(recipe: Recip
         points = {end for edges in said for u, v, _ in edges for end in (u, v)}
         walk = one.copy()
         for length in range(1, len(said)):
-            assert all(walk[p, p] <= 1e-7 for p in points), f"{length} would do for {in_words(clash)}"
+            assert all(walk[p, p] <= 1e-7 for p in points), f"{length} would do for {in_words(clash.clauses)}"
             walk = np.maximum(walk, (walk[:, :, None] + one[None, :, :]).max(axis=1))
 
 
