@@ -220,7 +220,8 @@ class Submission:
     def _plan_next(self, t: float) -> bool:
         """Plan the first block that is ready. Return False if there is none."""
         pending = self.pending.first_ready()
-        if pending is None:
+        # How much of its message is read before must not depend on when a voice answers.
+        if pending is None or (pending.utterances and self.queue and self.queue.message == pending.message):
             return False
         self._message = pending.message
         try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block, BlockProgress, WarningFeedback
+from bml_schema import Block, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
@@ -165,6 +165,22 @@ def test_submission_drops_the_gaze_of_a_newer_block_after_a_slow_voice() -> None
     driver.say(driver.spoken[0].id, spoken())
     warnings = [f.id for f in driver.run(5.0).feedback if isinstance(f, WarningFeedback)]
     assert warnings == ["b:g"]
+
+
+@pytest.mark.parametrize("answers_early", [True, False])
+def test_submission_reads_a_message_before_it_plans_its_speech(answers_early: bool) -> None:
+    driver = Driver(mute=True)
+    nod = '<bml id="b"><head id="n" lexeme="NOD" stroke="a:s:start + 0.5"/></bml>'
+    driver.session.receive(
+        1, f'<bml id="a"><speech id="s"><text>Hi</text></speech></bml>{nod}', driver.opened
+    )
+    driver.collect()
+    if not answers_early:
+        driver.run(0.0)
+    driver.say(driver.spoken[0].id, spoken())
+    predicted = [f for f in driver.run(0.2).feedback if isinstance(f, PredictionFeedback)]
+    named = [(f.blocks[0].id, len(f.behaviours)) for f in predicted]
+    assert named[:4] == [("a", 0), ("b", 0), ("a", 1), ("b", 1)]
 
 
 BMLA = 'xmlns:bmla="http://www.asap-project.org/bmla"'
