@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import sample
+from realizer.core import work
 from realizer.speech.accents import prosody_facts
 
 
@@ -27,6 +29,19 @@ NEUTRAL = Style()
 SHOWN = 0.5  # s after the start of a speech, at which its style is found
 
 
+def on_style(channels: Iterable[Channel]) -> list[Channel]:
+    """Return the channels on which the style of a face depends."""
+    wanted = _action_units()
+    return [channel for channel in work.counted(channels) if channel.target.column in wanted]
+
+
+@cache
+def _action_units() -> dict[int, int]:
+    """Return column -> number of the action units that change speech."""
+    rows = prosody_facts()["style"]
+    return {target.column: number for row in rows for number in row["aus"] for target in au(number)}
+
+
 def style_of(channels: Iterable[Channel], start: float) -> Style:
     """Return the style of a face that shows these channels shortly after a speech has started.
 
@@ -34,11 +49,11 @@ def style_of(channels: Iterable[Channel], start: float) -> Style:
     interrupted later counts as whole.
     """
     rows = prosody_facts()["style"]
-    wanted = {target.column: number for row in rows for number in row["aus"] for target in au(number)}
+    wanted = _action_units()
     active = [
         _without_later(channel, start)
-        for channel in channels
-        if channel.target.column in wanted and (channel.layer is not Layer.BASE or channel.times[0] <= start)
+        for channel in on_style(channels)
+        if channel.layer is not Layer.BASE or channel.times[0] <= start
     ]
     if not active:
         return NEUTRAL

@@ -16,7 +16,8 @@ from realizer.animation.idle.blinks import gaze_shifts
 from realizer.animation.idle.idle_face import Idle, idle_face
 from realizer.animation.idle.prosody import KnownMotion, SpeechSpan, phrase_ends, prosody_channels
 from realizer.animation.lips.lip_sync import opened
-from realizer.animation.speaking_style import Style, style_of
+from realizer.animation.speaking_style import Style, on_style, style_of
+from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.core.options import PlayOptions
 from realizer.playback.active_block import ActiveBlock
@@ -53,9 +54,13 @@ class FaceMotion:
         own = self._characters[character].channels()
         moods = [channel for channel in own if channel.layer is Layer.BASE]
 
+        @cache
+        def on_styles(playing: ActiveBlock) -> list[Channel]:
+            return on_style((*playing.moving_channels(), *moods))
+
         @cache  # the head and the mouth have the same style
         def style(playing: ActiveBlock, start: float) -> Style:
-            return style_of((*playing.moving_channels(), *moods), start)
+            return style_of(on_styles(playing), start)
 
         channels = [c for p in blocks for c in _with_feeling(p, partial(style, p), first, last)] + own
         if not self._options.idle:
@@ -74,7 +79,7 @@ class FaceMotion:
             if t.start - NEAR <= last and t.start + t.utterance.duration + NEAR >= first
         ]
         if near:
-            known = [motion for p in blocks for motion in p.known_motions()]
+            known = [motion for p in blocks for motion in work.counted(p.known_motions())]
             known += [KnownMotion(c.span[0], c) for c in own]
             channels += prosody_channels(near, first, last, seed, known)
         shifts = gaze_shifts(channels, first, last) if self._options.liveliness else ()
@@ -105,7 +110,7 @@ def _with_feeling(
     playing: ActiveBlock, style: Callable[[float], Style], first: float, last: float
 ) -> Iterator[Channel]:
     """Yield the channels of a block; the lips of speech near these times open by what the face shows."""
-    for behaviour, channels in playing.channels.items():
+    for behaviour, channels in work.counted(playing.channels.items()):
         speech = playing.speech.get(behaviour)
         if speech is not None and channels and channels[0].span[0] <= last and channels[0].span[1] >= first:
             channels = opened(channels, style(speech.start).opening)
