@@ -8,6 +8,7 @@ from math import inf
 
 import numpy as np
 
+from realizer.core import work
 from realizer.playback.active_block import ActiveBlock
 from realizer.scheduling.timing import Schedule
 
@@ -167,7 +168,7 @@ def _with_lost_points(playing: ActiveBlock) -> Schedule:
         return _revoked(playing.block.id)
     schedule, first = playing.schedule, _first_schedule(playing)
     points, times = dict(schedule.points), dict(schedule.times)
-    for behaviour, names in first.points.items() if playing.start < inf else ():
+    for behaviour, names in work.counted(first.points.items() if playing.start < inf else ()):
         known = points.get(behaviour, ())
         lost = [n for n, name in enumerate(names) if name not in known]
         if lost:

@@ -17,6 +17,7 @@ from realizer.animation.idle.idle_face import Idle
 from realizer.animation.idle.prosody import AFTERMATH
 from realizer.behaviours.kind import BehaviourKind, PlanningContext, Position
 from realizer.behaviours.registry import KINDS
+from realizer.core import work
 from realizer.core.array_types import Float64, Int16
 from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
@@ -92,7 +93,7 @@ class Player(BlockManager):
     def speech_requests(self, block: Block) -> dict[str, SpeechRequest]:
         """Return {behaviour id: request to the voice}, whose results `submit` needs."""
         requests: dict[str, SpeechRequest] = {}
-        for node in block.behaviours:
+        for node in work.counted(block.behaviours):
             kind = self.kinds.get(node.tag)
             if (
                 kind is not None

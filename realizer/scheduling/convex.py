@@ -174,7 +174,7 @@ def _bound(quadratic: Quadratic, binding: Bool, x: Float64) -> tuple[Float64, Fl
     if len(active):
         ties, pieces = UnionFind(m), UnionFind(m)
         ends = [end[active].tolist() for end in (quadratic.u, quadratic.v, quadratic.w)]
-        for k, u, v, w in zip(active.tolist(), *ends, strict=True):
+        for k, u, v, w in work.counted(zip(active.tolist(), *ends, strict=True)):
             if ties.find(u) != ties.find(v):
                 ties.tie(v, u, w)
                 beside.setdefault(u, []).append((v, k))
@@ -206,17 +206,17 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
     """Return (inequalities,) the forces that balance the springs on trees of tied nodes, leaves first."""
     force = np.zeros(len(quadratic.u))
     seen: set[int] = set()
-    for root in sorted(beside):
+    for root in work.counted(sorted(beside)):
         if root in seen:
             continue
         seen.add(root)
         order = [(root, root, -1)]
-        for node, _, _ in order:
+        for node, _, _ in work.counted(order):
             for to, k in beside[node]:
                 if to not in seen:
                     seen.add(to)
                     order.append((to, node, k))
-        for node, towards, k in reversed(order[1:]):
+        for node, towards, k in work.counted(reversed(order[1:])):
             force[k] = pull[node] if quadratic.v[k] == node else -pull[node]
             pull[towards] += pull[node]
     return force

@@ -87,9 +87,8 @@ def longest_path_levels(level: list[float], edges: Sequence[Edge], slack: float)
 
 def _cycle(cause: dict[int, int], edges: Sequence[Edge]) -> list[int]:
     """Return a cycle among the edges that raised their heads last, or []."""
-    work.count(len(cause) // 4)
     seen: dict[int, int] = {}
-    for start in cause:
+    for start in work.counted(cause):
         at = start
         while at in cause and at not in seen:
             seen[at] = start

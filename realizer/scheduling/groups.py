@@ -157,7 +157,7 @@ def _group_problem(model: Model, clusters: RigidClusters, groups: Sequence[Group
     work.count(len(model.owner) // 4)
     owner, root, shift = model.owner, model.root, model.shift
     chosen, held = np.zeros(len(clusters.label), np.bool_), np.zeros(len(clusters.label), np.bool_)
-    for group in groups:
+    for group in work.counted(groups):
         chosen[group.clusters] = True
         held[group.clusters] = group.held
     chosen, held = chosen[clusters.label], held[clusters.label]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from bml_schema import Block, ParameterValueChange, Speech
+from realizer.core import work
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.core.settings import Settings, limit_hint
 from realizer.playback.player import Player
@@ -202,6 +203,7 @@ class TtsRequests:
 
     def answer(self, id: int, result: Utterance | RealizerError, t: float) -> list[Speak]:
         """Take the answer to a request. If the voice failed, the silent voice replaces it."""
+        work.count(50)
         request = self._requests.pop(id, None)
         if request is None or (request.long_text is None and id not in request.pending.requests):
             return []
