@@ -20,8 +20,9 @@ DEGRADED = "degraded"  # status of `/healthz` while the process is overloaded
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 # Closed connections leave cycles: a collection is due after this many, or as many as are still open.
 ENDED = 100
-# Other cycles show in the memory of the process: it has grown to this factor and by these bytes.
-GROWN, MORE = 1.5, 100e6
+# Other cycles show in the memory of the process: it has grown to this factor and by these bytes, and by the
+# most that a behaviour takes which plays or is planned. While ten thousand play, a collection takes long.
+GROWN, MORE, PLAYED = 1.5, 100e6, 35e3
 
 
 def disable_automatic_gc() -> None:
@@ -42,11 +43,17 @@ class GcPolicy:
         self.ended_connections = 0
         self._least = memory()
 
-    def collect_if_needed(self, alive: int) -> bool:
-        """Run a full collection if one is due. Return whether it was."""
+    def collect_if_needed(self, alive: int, behaviours: int = 0) -> bool:
+        """Run a full collection if one is due. Return whether it was.
+
+        Args:
+            alive: number of open connections.
+            behaviours: number of behaviours of all blocks.
+        """
         used = memory()
         self._least = min(self._least, used)
-        if self.ended_connections < max(ENDED, alive) and used < GROWN * self._least + MORE:
+        most = GROWN * self._least + MORE + PLAYED * behaviours
+        if self.ended_connections < max(ENDED, alive) and used < most:
             return False
         gc.collect()
         self.ended_connections, self._least = 0, memory()
@@ -220,7 +227,10 @@ class SessionHost(SessionRunner):
             self._run(session, [Close(number, 1012, str(error)) for number in waiting])
 
     def _expire_sessions(self) -> None:
-        self._gc_policy.collect_if_needed(len(self._clients))
+        sessions = self._registry.sessions.values()
+        blocks = [p.block for session in sessions for p in session.player.blocks.all()]
+        blocks += [p.block for session in sessions for p in session.submission.pending.blocks]
+        self._gc_policy.collect_if_needed(len(self._clients), sum(len(block.behaviours) for block in blocks))
         for histogram in (self.metrics.late, self.metrics.planning, self.metrics.slow_steps):
             histogram.count()
         now = self._loop.time()

@@ -473,6 +473,7 @@ def test_gc_policy_collects_when_the_process_has_grown(monkeypatch: pytest.Monke
     used = 390e6
     assert not known.collect_if_needed(1000)
     used = 410e6
+    assert not known.collect_if_needed(1000, 1000)  # what plays needs memory too
     assert known.collect_if_needed(1000)
     assert tied() is None
     assert not known.collect_if_needed(1000)  # that is how large it is now
