@@ -63,6 +63,13 @@ class BlockStore:
             del self._blocks[playing.number]
         return gone
 
+    def clear(self) -> None:
+        """Forget all blocks and schedules."""
+        self._blocks.clear()
+        self._active.clear()
+        self._ended.clear()
+        self._past.clear()
+
     def note_revoked(self, id: str) -> None:
         if not self.has_seen(id):
             self._remember(_revoked(id))

@@ -207,6 +207,12 @@ class EventQueue:
         """Return the future sync points of a block, as (behaviour, sync)."""
         return {(e.name, e.sync) for e in self._events.get(playing.number, ()) if e.name}
 
+    def clear(self) -> None:
+        """Remove all events."""
+        self._first = None
+        self._events.clear()
+        self._firsts.clear()
+
     def drop(self, playing: ActiveBlock) -> None:
         if self._events.pop(playing.number, None) is not None:
             self._find_next()

@@ -95,11 +95,8 @@ class Player(BlockManager):
         requests: dict[str, SpeechRequest] = {}
         for node in work.counted(block.behaviours):
             kind = self.kinds.get(node.tag)
-            if (
-                kind is not None
-                and kind.speech_request is not None
-                and (say := kind.speech_request(node, self.context)) is not None
-            ):
+            request = None if kind is None else kind.speech_request
+            if request is not None and (say := request(node, self.context)) is not None:
                 requests[node.id] = say
         return requests
 
@@ -132,6 +129,11 @@ class Player(BlockManager):
         )
         world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes)
         return self.accept(block, world, now)
+
+    def clear(self) -> None:
+        """Forget all blocks; a player that is not used any more would leave them to the garbage collector."""
+        self.blocks.clear()
+        self.timeline.events.clear()
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Set the positions of targets for documents that are planned from now on."""
@@ -203,9 +205,7 @@ class Player(BlockManager):
         Blocks that start at `starts_before` or later do not start yet.
         """
         forgettable = now - self.history - RELAX - AFTERMATH
-        due = self.timeline.events.next
-        is_due = due is not None and due <= now
-        if not (is_due or self.blocks.first_invisible < forgettable or self.reports):
+        if not (self.next_event <= now or self.blocks.first_invisible < forgettable or self.reports):
             return []
         self.advance(now, starts_before)
         out = self.reports.take_all()

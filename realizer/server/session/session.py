@@ -160,6 +160,7 @@ class Session:
         self.closed = True
         self.connections.clear()
         self.submission.queue.clear()
+        self.player.clear()
         self._effects.clear()
 
     def update_backlog(self, connection: int, waiting: int) -> None:

@@ -466,6 +466,21 @@ def test_gc_policy_collects_when_as_many_have_ended_as_are_alive() -> None:
 
 
 @pytest.mark.usefixtures("no_automatic_gc")
+def test_session_host_frees_the_blocks_of_a_session_that_ends() -> None:
+    async def test(host: SessionHost) -> None:
+        number, client = subscribed(host, "s")
+        host.receive(number, large("a", 20))
+        await asyncio.sleep(1)
+        assert predicted(client) == ["a"]
+        (playing,) = map(weakref.ref, host._registry.sessions["s"].player.blocks.all())
+        host.end("s")
+        await asyncio.sleep(1)
+        assert playing() is None
+
+    hosted(test)
+
+
+@pytest.mark.usefixtures("no_automatic_gc")
 def test_gc_policy_collects_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
     used = 200e6
     monkeypatch.setattr(session_host, "memory", lambda: used)
