@@ -52,7 +52,7 @@ class FaceMotion:
         first, last = float(times[0]), float(times[-1])
         blocks = self._blocks.of_character(character)
         own = self._characters[character].channels()
-        moods = [channel for channel in own if channel.layer is Layer.BASE]
+        moods = [channel for channel in work.counted(own) if channel.layer is Layer.BASE]
 
         @cache
         def on_styles(playing: ActiveBlock) -> list[Channel]:
@@ -80,7 +80,7 @@ class FaceMotion:
         ]
         if near:
             known = [motion for p in blocks for motion in work.counted(p.known_motions())]
-            known += [KnownMotion(c.span[0], c) for c in own]
+            known += [KnownMotion(c.span[0], c) for c in work.counted(own)]
             channels += prosody_channels(near, first, last, seed, known)
         shifts = gaze_shifts(channels, first, last) if self._options.liveliness else ()
         ends = phrase_ends(talk for talk, _ in talks)

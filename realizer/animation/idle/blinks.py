@@ -20,6 +20,7 @@ from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.animation.curves import smooth
 from realizer.animation.idle.rng import uniform
+from realizer.core import work
 from realizer.core.array_types import Bool, Float64, Index
 from realizer.speech.accents import prosody_facts
 
@@ -223,7 +224,7 @@ def gaze_shifts(channels: Iterable[Channel], start: float, end: float) -> list[G
     Channels of one gaze or gaze shift share their key times.
     """
     turns = dict[int, tuple[list[float], list[complex]]]()
-    for channel in channels:
+    for channel in work.counted(channels):
         if channel.layer in (Layer.GAZE, Layer.BASE) and (most := _degrees().get(channel.target.column)):
             keys = channel.times
             if keys[-1] >= start - SHOWN:
