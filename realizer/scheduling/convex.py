@@ -211,12 +211,12 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
             continue
         seen.add(root)
         order = [(root, root, -1)]
-        for node, _, _ in work.counted(order):
+        for node, _, _ in order:
             for to, k in beside[node]:
                 if to not in seen:
                     seen.add(to)
                     order.append((to, node, k))
-        for node, towards, k in work.counted(reversed(order[1:])):
+        for node, towards, k in reversed(order[1:]):
             force[k] = pull[node] if quadratic.v[k] == node else -pull[node]
             pull[towards] += pull[node]
     return force

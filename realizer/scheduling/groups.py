@@ -214,6 +214,8 @@ def _yield_to_stated(model: Model, gaps: Index) -> None:
     least[model.gap + 1] = model.least
     room = np.cumsum(least)[[p, q]]
     short = (length >= -LOOSE) & (length < room[1] - room[0])
+    if not short.any():
+        return
     owners, firsts = np.unique(owner[model.gap[gaps]], return_index=True)
     named = np.isin(owners, owner[p[short]])
     begins = zip(owners[named].tolist(), gaps[firsts[named]].tolist(), strict=True)

@@ -52,7 +52,8 @@ class Model:
 
     def stated_lengths(self) -> tuple[Index, Index, Float64]:
         """Return successive tied points of behaviours that have one root, and the seconds between them."""
-        tied = self.tied[np.lexsort((self.tied, self.root[self.tied], self.owner[self.tied]))]
+        of_one = self.owner[self.tied] * len(self.owner) + self.root[self.tied]
+        tied = self.tied[np.argsort(of_one, kind="stable")]
         p, q = tied[:-1], tied[1:]
         same = (self.owner[p] == self.owner[q]) & (self.root[p] == self.root[q])
         p, q = p[same], q[same]
