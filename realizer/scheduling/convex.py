@@ -48,10 +48,11 @@ def feasible_start(
     If there is none, return an arbitrary x, and the numbers of inequalities that form a cycle of positive
     length.
     """
-    work.count(len(quadratic.u) // 2)
-    u, v, w = quadratic.u, quadratic.v, quadratic.w
-    order = np.argsort(start[u], kind="stable")
-    edges = list(zip(u[order].tolist(), v[order].tolist(), w[order].tolist(), strict=True))
+    work.count(len(quadratic.u) // 4)
+    order = np.argsort(start[quadratic.u], kind="stable")
+    columns = [ends[order].tolist() for ends in (quadratic.u, quadratic.v, quadratic.w)]
+    work.count(len(order) // 4)
+    edges = list(zip(*columns, strict=True))
     level = start.tolist()
     if cycle := longest_path_levels(level, edges, slack):
         return start, order[cycle].tolist()

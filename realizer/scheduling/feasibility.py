@@ -68,6 +68,9 @@ class ConstraintNetwork:
             step = (heappop(queue) if latest is None else heappushpop(queue, latest))[2]
             u, v, seconds, reason = step
             latest, steps, time = None, steps + 1, level[u] + seconds
+            if steps > STEPS:
+                work.count(3 * steps)
+                steps = 0
             if time <= level[v] + LOOSE:
                 continue
             if v in (ORIGIN, link.u):
@@ -75,9 +78,6 @@ class ConstraintNetwork:
                 for point, (old, earlier) in before.items():
                     level[point], cause[point] = old, earlier
                 return cycle
-            if steps > STEPS:
-                work.count(3 * steps)
-                steps = 0
             if v not in before:
                 before[v] = level[v], cause[v]
             level[v], cause[v] = time, reason
