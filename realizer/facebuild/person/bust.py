@@ -129,8 +129,10 @@ def _tongue(person: Person, recipe: Recipe) -> Part:
     across = np.abs(place[:, 0]) / np.abs(place[:, 0]).max()
     shade = 1 - 0.30 * smooth(across, 0.14, 0.0) - 0.35 * smooth(across, 0.55, 1.0)
     colours: Float64 = np.array(recipe.colours["tongue"], float) * shade[:, None]
-    deep = (place[:, 2].max() - place[:, 2]) / np.ptp(place[:, 2])
-    light = 0.30 * smooth(deep, 0.70, 0.0) + 0.45
+    # An open mouth is dark behind: little light reaches the tongue's back.
+    lit = along**1.5
+    colours *= 0.60 + 0.40 * lit[:, None]
+    light = 0.08 + 0.66 * lit
     moves = opening_rows(place, person.jaw_pivot, np.interp(along, (0, 1), SINKS))
     moves |= tongue_bends(place, along, np.ones(len(place)))[2]
     gloss = np.full(len(place), 0.35)
