@@ -96,7 +96,7 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     length = sides + (top - sides) * smooth(unit(at - scalp.middle)[:, 1], 0.2, 0.85)
     lines = grow(scalp, style, at, layer, length * rng.uniform(0.75, 1.15, count), style.segments, rng)
     s = np.linspace(0, 1, style.segments + 1)
-    shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - (0.55 - 0.35 * style.heavy) * smooth(s, 0.5, 1.0))
+    shape = (0.45 + 0.75 * smooth(s, 0.0, 0.35)) * (1 - (0.75 - 0.55 * style.heavy) * smooth(s, 0.5, 1.0))
     width = style.width * rng.uniform(0.7, 1.3, (count, 1)) * shape
     light = (1 - style.depth * 0.8 * (1 - layer[:, None])) * (0.45 + 0.55 * smooth(s, 0.0, 0.35))
     names = np.where(layer < UNDER, style.under, rng.choice(style.strips, count))

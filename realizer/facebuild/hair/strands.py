@@ -105,7 +105,7 @@ def thickness(scalp: Scalp, style: Style, at: Float64) -> Float64:
     crown = 1 + style.crown * smooth(way[:, 1], 0.3, 0.9) * (1 - way[:, 0] ** 2)
     if not style.tied:
         # Hair lies flat where it is parted.
-        crown = crown * (0.25 + 0.75 * smooth(Flow(scalp, style).distance(at), 0.0, 0.03))
+        crown = crown * (0.35 + 0.65 * smooth(Flow(scalp, style).distance(at), 0.0, 0.08))
     return np.asarray(np.maximum(thick * side * crown, LEAST))
 
 
