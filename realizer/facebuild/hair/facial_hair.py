@@ -18,7 +18,7 @@ from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
-BEARD_CARDS = 1150  # cards of a full beard
+BEARD_CARDS = 1600  # cards of a full beard
 LONG, WIDE = 0.024, 0.0046  # m, of a card on the chin of a full beard
 SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
@@ -51,7 +51,7 @@ def beard(
     middle = at[triangles].mean(axis=1)
     lip = (middle[:, 1] > points["2.2"][1]) & (np.abs(middle[:, 0]) < points["8.3"][0] + 0.008)
     low = np.where(lip, 0.15, 0.3)
-    weight = area * np.where(lip, 3, 1) * smooth(where[triangles].mean(axis=1), low, low + 0.35)
+    weight = area * np.where(lip, 5, 1) * smooth(where[triangles].mean(axis=1), low, low + 0.35)
     # Evenly: cards by chance alone would leave holes.
     even = (np.arange(BEARD_CARDS) + rng.uniform(0, 1, BEARD_CARDS)) / BEARD_CARDS
     pick = np.searchsorted(np.cumsum(weight / weight.sum()), even).clip(0, len(triangles) - 1)
@@ -82,7 +82,8 @@ def beard(
         lift, ups_there = scalp.lift(places[k])
         places[k:] += ups_there * (ROOT - lift).clip(0, DEEPEST)[:, None]
     places = places.transpose(1, 0, 2)
-    thin = (where[corners] * shares).sum(axis=1) < rng.uniform(0.4, 1.0, BEARD_CARDS)
+    least = np.where(above, 0.3, 1) * rng.uniform(0.4, 1.0, BEARD_CARDS)
+    thin = (where[corners] * shares).sum(axis=1) < least
     width = WIDE * rng.uniform(0.7, 1.2, (BEARD_CARDS, 1)) * np.array([0.8, 1.0, 0.7]) * min(1, 0.5 + amount)
     light = np.broadcast_to(0.55 + 0.45 * s, (BEARD_CARDS, SEGMENTS + 1)) * rng.uniform(
         0.7, 1, (BEARD_CARDS, 1)
