@@ -53,7 +53,7 @@ class Skin:
         self.ring = self._bordered(texels.blurred(self.field(ring), ROUNDED))
         self.dry: Bool = self.field(lips.inside) < 0.5
         # The red of the lower lip ends in the crease below it.
-        shift = 0.22 * self.noise(0.0022, 1, self.ring < 10) - 0.7 * (1 - self.field(lips.is_upper))
+        shift = 0.12 * self.noise(0.0022, 1, self.ring < 10) - 0.7 * (1 - self.field(lips.is_upper))
         self.red: Float32 = self.float(smooth(self.ring + shift, *self.table["lips"]["border"])) * self.dry
 
     def _bordered(self, ring: Float32) -> Float32:
@@ -65,7 +65,7 @@ class Skin:
         at, t = self.person.ground.at, np.arange(RING_SIZE + 1)
         inner, line, outer = (at[self.lips.rings[k]] for k in (BORDER - 1, BORDER, BORDER + 1))
         gap = np.linalg.norm(outer - inner, axis=1, keepdims=True) / 2
-        across = gaussian_filter1d((outer - inner) / gap**2 / 2, EVEN, axis=0, mode="wrap")
+        across = gaussian_filter1d((outer - inner) / gap**2 / 2, 3 * EVEN, axis=0, mode="wrap")
         corner = np.abs(self.lips.u[self.lips.rings[BORDER]])[:, None]
         even = gaussian_filter1d(line, EVEN, axis=0, mode="wrap")
         line = even + (line - even) * smooth(corner, 0.75, 0.95)
