@@ -119,8 +119,10 @@ def flow(blocking: Iterable[str]) -> Flow:
 
 
 async def next_item(queue: Flow) -> str | None:
-    """Return the next item of a queue, or None at its end."""
+    """Return the next item of a queue, or None at its end, also when it is read again there."""
     item = await queue.get()
+    if item is None:
+        queue.put_nowait(None)  # "go on" reads the end again
     if isinstance(item, Exception):
         raise item
     return item
