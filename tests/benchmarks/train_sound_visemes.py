@@ -31,11 +31,11 @@ from realizer.speech.sound_visemes.mel_stream import (
 from realizer.speech.sound_visemes.recogniser import FLOOR, FUTURE, OFFSETS, PAST, SCALE, SILENT, WEIGHTS
 
 NOT_SEEN = -1  # the class of sounds without a shape of the lips, such as h
-HIDDEN = (896, 512, 256)
+HIDDEN = (512, 256)
 LENGTH = 480  # frames at most that are used together
 STRIDE = 8  # from one frame of a sentence that is used at a time to the next
-EPOCHS, STEP, TOGETHER, TESTED = 120, 1e-3, 32, 8
-DROPPED = 0.2  # of the hidden units in training
+EPOCHS, STEP, TOGETHER, TESTED = 100, 1.2e-3, 64, 8
+DROPPED = 0.1  # of the hidden units in training
 DECAY = 0.02  # of the weights
 SMOOTH = 0.05  # of the certainty of each label
 KEPT = 0.999  # of the averaged weights in a step
