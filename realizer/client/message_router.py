@@ -166,6 +166,8 @@ class Router:
             self._request, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
             self.errors.append(reply)
+            if reply["type"] == "error":
+                _LOG.warning("%s", ClientError.of(reply))
             for listener in self._listeners:
                 listener.on_error(reply)
 

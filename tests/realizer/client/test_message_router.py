@@ -50,6 +50,16 @@ def test_router_logs_what_was_dropped(mail, caplog) -> None:
     assert record.getMessage() == "b:n: CANNOT_CREATE_BEHAVIOR: no such lexeme"
 
 
+def test_router_logs_an_error_without_a_request_once(mail, caplog) -> None:
+    mail.expect_answer("ping")
+    mail.receive(error("ping.id"))
+    assert not caplog.records, "the request raises it"
+    mail.receive(error("type"))
+    (record,) = caplog.records
+    assert (record.name, record.levelname) == ("realizer.client", "WARNING")
+    assert record.getMessage() == "type: wanted another"
+
+
 @pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
 def test_router_raises_the_error_of_a_request(mail, where) -> None:
     mail.expect_answer("subscribe")
