@@ -140,13 +140,18 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
       return this.#fail("connection", error);
     }
     this.realizer = realizer;
+    let wasOpen = false;
     realizer.onopen = () => {
+      wasOpen = true;
       this.#reset();
       this.#clear("connection");
     };
-    realizer.onlost = () => fail(new Error(`lost the connection to ${realizer.url.origin}, connecting again`));
+    realizer.onlost = () => {
+      const { origin } = realizer.url;
+      fail(new Error(wasOpen ? `lost the connection to ${origin}, connecting again` : `no service at ${origin}, or it refuses this page; trying again`));
+    };
     const character = own("character");
-    realizer.connect().catch(fail);
+    realizer.connect().catch((error) => realizer.socket ?? fail(error)); // `onlost` says why there is no connection
     const take = (frame) => this.realizer === realizer && this.#take(frame);
     const play = (packet) => this.realizer === realizer && this.#sound.packet(packet.time, packet.values(), packet.forget);
     const chosen = character === undefined ? {} : { character };
