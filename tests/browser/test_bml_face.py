@@ -120,6 +120,35 @@ def test_bml_face_moves_the_mouth_of_our_own_face(show) -> None:  # type: ignore
     assert 0.4 < columns.mean() / before.shape[1] < 0.6
 
 
+def speckles(shot: np.ndarray) -> int:
+    """How many pixels of the brows are much lighter or much darker than both of their neighbours."""
+    rows = shot[int(0.32 * len(shot)) : int(0.4 * len(shot))].sum(axis=2)
+    steps = np.diff(rows, axis=1)
+    before, after = steps[:, :-1], steps[:, 1:]
+    return int(((np.minimum(np.abs(before), np.abs(after)) > 60) & (before * after < 0)).sum())
+
+
+@pytest.mark.long
+def test_bml_face_shows_our_own_face_as_stills_do(show) -> None:  # type: ignore[no-untyped-def]
+    page = loaded(show("ada.glb"))
+    drawn = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    page.evaluate(drawn)
+    shot = picture(page)
+    still = realizer.realize("Hi", voice="silent").picture(
+        at=0, size=shot.shape[1::-1], background="transparent"
+    )
+    covers = np.abs(shot - shot[:, :1]).max(axis=2) > 40, still[..., 3] > 127
+    crown, still_crown = (int(np.argmax(cover[:, len(cover) // 2])) / len(cover) for cover in covers)
+    assert crown == pytest.approx(still_crown, abs=0.03)
+    width, still_width = (cover[len(cover) // 3].mean() for cover in covers)
+    assert width == pytest.approx(still_width, abs=0.03)
+    page.evaluate(
+        "face.avatar.scene.traverse(({ material }) => material?.[1] && (material[1].visible = false))"
+    )
+    page.evaluate(drawn)
+    assert speckles(shot) < 0.7 * speckles(picture(page)), "hair has smooth edges"
+
+
 def test_bml_face_says_what_is_typed_with_sound(show) -> None:  # type: ignore[no-untyped-def]
     page = loaded(show("plate.glb"))
     page.fill("input", "Papa & Mama <spoke>")

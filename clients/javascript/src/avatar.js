@@ -26,6 +26,7 @@ const EXPRESSIONS = {
 };
 const BONES = { head: "head", neck: "neck", lefteye: "leftEye", eyeleft: "leftEye", eyel: "leftEye", leye: "leftEye", righteye: "rightEye", eyeright: "rightEye", eyer: "rightEye", reye: "rightEye" };
 const BALL = /eye(?!.*(lash|brow|lid|shadow|occlusion))/i;
+const FAINT = 0.02; // alpha of hair that is not drawn
 const MOVED = 1e-5; // in the unit of the mesh
 const UP = new Vector3(0, 1, 0);
 const SIDE = new Vector3(1, 0, 0);
@@ -81,9 +82,10 @@ export class Avatar {
         const shape = shapeOf(name);
         if (!shape) continue;
         this.#targets.set(shape, [...(this.#targets.get(shape) ?? []), { mesh, index }]);
-        ballsMove ||= shape.startsWith("eyeLook") && BALL.test(`${mesh.name} ${mesh.parent?.name}`) && moves(mesh, index).length > 0;
+        ballsMove ||= shape.startsWith("eyeLook") && BALL.test(`${mesh.name} ${mesh.parent?.name}`) && greatest(distances(mesh, index)) >= MOVED;
       }
       mesh.frustumCulled = false; // bounds do not follow morph targets
+      if (mesh.material?.isMeshStandardMaterial && mesh.material.alphaTest > 0) soften(mesh);
     });
     const expressions = vrm?.expressionManager?.expressions.map(({ expressionName }) => expressionName) ?? [];
     if (expressions.some(shapeOf)) this.#presets = expressions.filter(shapeOf);
@@ -112,9 +114,13 @@ export class Avatar {
     const at = new Vector3();
     const head = this.#vrm?.humanoid.getRawBoneNode("head");
     if (head) return box.setFromCenterAndSize(head.getWorldPosition(at).add(new Vector3(0, 0.07, 0.05)), new Vector3(0.14, 0.14, 0.14));
-    for (const { mesh, index } of [...this.#targets.values()].flat()) {
-      mesh.skeleton?.update();
-      for (const k of moves(mesh, index)) box.expandByPoint(mesh.getVertexPosition(k, at).applyMatrix4(mesh.matrixWorld));
+    for (const targets of this.#targets.values()) {
+      const moved = targets.map(({ mesh, index }) => ({ mesh, far: distances(mesh, index) }));
+      const least = Math.max(MOVED, greatest(moved.flatMap(({ far }) => far)) / 5); // the jaw hardly moves a collar
+      for (const { mesh, far } of moved) {
+        mesh.skeleton?.update();
+        for (const k of far.keys()) if (far[k] >= least) box.expandByPoint(mesh.getVertexPosition(k, at).applyMatrix4(mesh.matrixWorld));
+      }
     }
     return box.isEmpty() ? box.setFromObject(this.scene) : box;
   }
@@ -159,13 +165,21 @@ export class Avatar {
   }
 }
 
-/** Return the numbers of the vertices that a morph target moves by a fifth of its greatest move, or more. */
-function moves(mesh, index) {
-  const target = mesh.geometry.morphAttributes.position?.[index];
-  const far = Array.from({ length: target?.count ?? 0 }, (_, k) => Math.hypot(target.getX(k), target.getY(k), target.getZ(k)));
-  const least = Math.max(MOVED, far.reduce((a, b) => Math.max(a, b), 0) / 5);
-  return [...far.keys()].filter((k) => far[k] >= least);
+/** Draw a mesh a second time, blended, since the edges of hair that its map cuts out are speckled. */
+function soften(mesh) {
+  const edges = Object.assign(mesh.material.clone(), { transparent: true, depthWrite: false, alphaTest: FAINT, forceSinglePass: true });
+  mesh.material = [mesh.material, edges];
+  mesh.geometry.clearGroups();
+  for (const k of mesh.material.keys()) mesh.geometry.addGroup(0, Infinity, k);
 }
+
+/** Return how far a morph target moves each vertex. */
+function distances({ geometry }, index) {
+  const target = geometry.morphAttributes.position?.[index];
+  return Array.from({ length: target?.count ?? 0 }, (_, k) => Math.hypot(target.getX(k), target.getY(k), target.getZ(k)));
+}
+
+const greatest = (values) => values.reduce((a, b) => Math.max(a, b), 0);
 
 /** Return a rotation: roll first, yaw last. */
 function rotation(yaw = 0, pitch = 0, roll = 0) {

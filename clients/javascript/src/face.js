@@ -14,7 +14,8 @@ export { Avatar, loadAvatar, shapeOf };
 
 const FPS = 30;
 const ANGLE = 20; // degrees, of the camera
-const AROUND = 1.8; // height of the picture in heights of the part of the face that moves
+const AROUND = 2; // height of the picture in heights of the part of the face that moves
+const ABOVE = 0.08; // of these heights, from its middle to that of the picture
 const KEPT = 1; // s; older frames are dropped
 const GESTURES = ["pointerdown", "keydown"];
 const STYLE = `
@@ -195,6 +196,7 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
     const box = this.avatar.bounds;
     const middle = box.getCenter(new Vector3());
     const { x, y } = box.getSize(new Vector3());
+    middle.y += ABOVE * y;
     const far = (AROUND * Math.max(x, y, 1e-3)) / 2 / Math.tan((ANGLE * Math.PI) / 360);
     camera.position.set(middle.x, middle.y, box.max.z + far);
     camera.near = far / 100;
