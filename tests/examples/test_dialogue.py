@@ -198,6 +198,17 @@ def test_history_has_only_what_was_heard() -> None:
     assert history[3]["content"] == "One two three. "
 
 
+def test_turn_goes_on_after_a_model_that_has_finished() -> None:
+    async def run() -> list[str]:
+        async with asyncio.timeout(LIMIT):
+            cut = dialogue.Turn(None, "turn1", dialogue.flow(["One two ", "three."]))
+            assert [word async for word in cut.words()] == ["One ", "two ", "three."]
+            rest = dialogue.Turn(None, "turn3", cut.tokens, " three.")
+            return [word async for word in rest.words()]
+
+    assert asyncio.run(run()) == [" ", "three."]
+
+
 @pytest.mark.parametrize(
     ("said", "was_heard"),
     [
