@@ -66,7 +66,8 @@ def scripted(history: History) -> Iterator[str]:
     said = history[-1]["content"].lower()
     text = " ".join(next(text for words, text in SCRIPT.items() if re.search(words, said)).split())
     if len(history) > 1 and (before := history[-2]["content"]).endswith(CUT):
-        text = f"[surprise] Yes? I had said: {' '.join(before.split()[-3:-1])}. {text}"
+        last = " ".join(before.split()[-3:-1]).rstrip(".,;:!?") or "nothing"
+        text = f"[surprise] Yes? I had said: {last}. {text}"
     for at in range(0, len(text), 4):
         time.sleep(0.01)
         yield text[at : at + 4]

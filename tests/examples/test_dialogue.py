@@ -198,6 +198,16 @@ def test_history_has_only_what_was_heard() -> None:
     assert history[3]["content"] == "One two three. "
 
 
+@pytest.mark.parametrize(
+    ("heard", "repeated"),
+    [("It could not stop.", "not stop."), ("With pleasure, it", "pleasure, it."), ("", "nothing.")],
+)
+def test_scripted_repeats_the_last_words_as_one_sentence(heard: str, repeated: str) -> None:
+    before = {"role": "assistant", "content": heard + dialogue.CUT}
+    text = "".join(dialogue.scripted([before, {"role": "user", "content": "What?"}]))
+    assert text.startswith(f"[surprise] Yes? I had said: {repeated} [raise_brows]")
+
+
 def test_turn_goes_on_after_a_model_that_has_finished() -> None:
     async def run() -> list[str]:
         async with asyncio.timeout(LIMIT):
