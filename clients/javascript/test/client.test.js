@@ -113,7 +113,7 @@ test("voice is silent after stop", async () => {
 test("voice ends when it is stopped before anything was sent", async () => {
   const voice = realizer.voice({ rate: RATE });
   voice.stop();
-  assert.ok((await voice.ended()).toString().includes("INTERRUPTED"));
+  assert.match((await voice.ended()).toString(), /INTERRUPTED|REVOKED/); // it may not have started
 });
 
 test("frameOf refuses an unknown kind", () => {

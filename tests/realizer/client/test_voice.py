@@ -151,7 +151,7 @@ def test_speech_and_voice_end_when_they_are_stopped_before_anything_was_sent() -
             await voice.write(TONE[:100])
             for each in (voice, client.speech("s")):
                 await each.stop()
-                assert (await each.ended()).status == "INTERRUPTED"
+                assert (await each.ended()).status in ("INTERRUPTED", "REVOKED")  # it may not have started
 
     serving(test)
 
