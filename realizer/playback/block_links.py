@@ -182,21 +182,43 @@ def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
     return playing.start + time <= now
 
 
-def member(playing: ActiveBlock, origin: float, now: float, *, is_moved: bool = False) -> Member:
-    """Return a playing block on the clock of a block that starts at `origin`, with fixed past points.
+def members(
+    blocks: Collection[ActiveBlock],
+    origin: float,
+    now: float,
+    *,
+    is_moved: bool = False,
+    new: Block | None = None,
+) -> list[Member]:
+    """Return playing blocks on the clock of a block that starts at `origin`, with fixed past points.
+
+    If one of them, or the `new` block, refers to an anticipator, the others do not move towards it: an open
+    speech would delay its own sentences, and so its end, for ever.
 
     With `is_moved`, points at `now` may still move if the block has not started. A new block does not move
     them: what it refers to starts in time.
     """
+    anticipating = [bool(anticipators_of(p.block)) for p in blocks]
+    is_held = any(anticipating) or (new is not None and bool(anticipators_of(new)))
+    return [
+        _member(p, origin, now, is_moved, is_held and not own)
+        for p, own in zip(blocks, anticipating, strict=True)
+    ]
+
+
+def _member(playing: ActiveBlock, origin: float, now: float, is_moved: bool, is_held: bool) -> Member:
+    """Return one member; if it `is_held`, its behaviours that refer to nothing keep their starts."""
     delay = playing.start - origin
     passed_times: dict[str, dict[str, float]] = {}
-    for behaviour in playing.plan.timings if playing.has_begun or not is_moved else ():
+    for behaviour in playing.plan.timings:
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
         passed = {
             point: float(time) + delay
             for point, time in zip(points, times, strict=True)
-            if playing.start + float(time) <= now
+            if (playing.has_begun or not is_moved) and playing.start + float(time) <= now
         }
+        if is_held and not playing.block[behaviour].references:
+            passed[points[0]] = float(times[0]) + delay
         if passed:
             passed_times[behaviour] = passed
     return Member(

@@ -13,7 +13,7 @@ from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work
 from realizer.playback import block_links
 from realizer.playback.active_block import ActiveBlock, Dependency
-from realizer.playback.block_links import affected_blocks, member
+from realizer.playback.block_links import affected_blocks, members
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_planner import plan as plan_block
 from realizer.playback.block_states import BlockEvent
@@ -91,7 +91,7 @@ class BlockTimeline:
                 start=origin,
                 external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
                 existing_claims=existing if start <= now else (),
-                others=[member(p, origin, now) for p in others],
+                others=members(others, origin, now, new=block),
                 may_stretch=may_stretch,
             )
 
@@ -303,11 +303,11 @@ class BlockTimeline:
 
     def _retime_together(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> str | None:
         """Change the times of playing blocks to the best fit; if there is none, return why."""
-        members = [member(p, origin, now, is_moved=True) for p in blocks]
+        together = members(blocks, origin, now, is_moved=True)
         instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
         try:
             with work.limited(blocks[0].context.max_planning):
-                schedules = schedule_together(members, outside=instants)
+                schedules = schedule_together(together, outside=instants)
         except work.WorkLimitError as error:
             return str(error)
         if not schedules[0].failed and not self._conflict(blocks, schedules):

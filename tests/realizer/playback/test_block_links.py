@@ -291,6 +291,17 @@ def test_affected_blocks_are_connected_by_future_points() -> None:
 BEAT = '<head id="n" lexeme="NOD" stroke="anticipators:clock:beat"/>'
 
 
+def test_members_do_not_move_towards_an_anticipated_point(stage: Stage) -> None:
+    stage.player.anticipate("clock", {"beat": 1e6}, 0.0)
+    stage.send("first", '<wait id="w" duration="1"/>')
+    stage.send("a", '<wait id="w" duration="2"/>', said='composition="APPEND"')
+    stage.send("b", FACE.format(' start="a:w:start" end="anticipators:clock:beat"'))
+    stage.player.anticipate("clock", {"beat": 30.0}, 0.5)
+    times = stage.times()
+    assert times["a:w:start"] == times["b:f:start"] == pytest.approx(1.0)
+    assert times["b:f:end"] == pytest.approx(30.0)
+
+
 def test_anticipate_moves_a_behaviour_tied_to_the_point(stage: Stage) -> None:
     stage.player.anticipate("clock", {"beat": 3.0}, 0.0)
     stage.send("a", BEAT)

@@ -274,6 +274,22 @@ def test_advance_lets_expressions_last_until_the_end(start) -> None:
     assert frames[-1].values[names.index("12L")] == 0
 
 
+@pytest.mark.parametrize("text", ['<sync id="m"/>I am happy. And you?', "Well. " * 9 + '<sync id="m"/>Bye.'])
+def test_speech_streams_do_not_wait_for_an_expression_up_to_their_end(text) -> None:
+    driver = Talker()
+    driver.append("Hello! ")
+    driver.send(f'<bml id="smile">{SMILE.format("turn:turn:m")}</bml>')
+    driver.append(text + " And more. " * 9, close=True)
+    client = driver.run(60)
+    at = times(client)
+    (chunk,) = (id.removesuffix(":turn:m") for id in at if id.endswith(":turn:m"))
+    spoken = len(driver.spoken)
+    assert [at[f"turn.{n}:start"] for n in range(1, spoken + 1)] == pytest.approx(EACH * np.arange(spoken))
+    assert at["smile:s:start"] == pytest.approx(at[f"{chunk}:turn:m"])
+    assert at["smile:s:end"] == pytest.approx(at["turn:end"])
+    assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
+
+
 def test_advance_predicts_the_end_once_it_is_known() -> None:
     driver = Talker()
     driver.append("One. Two.")
@@ -400,6 +416,7 @@ ACTS = st.lists(
         st.tuples(st.just("close"), st.just("")),
         st.tuples(st.just("stop"), st.sampled_from(["turn", "turn.1", "turn.2", "b"])),
         st.tuples(st.just("bml"), st.sampled_from(["turn:turn:m", "turn:turn:end", "turn.1:turn:end"])),
+        st.tuples(st.just("smile"), st.sampled_from(["turn:turn:m", "turn:turn:start"])),
         st.tuples(st.just("run"), st.sampled_from([0.1, 0.4, 1.0])),
     ),
     max_size=20,
@@ -419,6 +436,8 @@ def test_speech_streams_end_every_block_in_any_order(acts) -> None:
                 driver.send({"type": "stop", "blocks": [what]})
             case "bml":
                 driver.send(f'<bml id="b"><head id="n" lexeme="NOD" start="{what}"/></bml>')
+            case "smile":
+                driver.send(f'<bml id="c">{SMILE.format(what)}</bml>')
             case "run":
                 driver.run(driver.now + float(what))
     driver.append(close=True)
