@@ -30,13 +30,16 @@ SAME = 1e-9  # s
 
 @dataclass(frozen=True, eq=False)
 class Dependency:
-    """A block that another one waits for: for its end, or until it subsides."""
+    """A block that another one waits for: for its end, until it subsides, or until its speech is over."""
 
     block: ActiveBlock
     subsiding: bool = False
+    speaking: bool = False
 
     @property
     def until(self) -> float:
+        if self.speaking:
+            return self.block.speaks_until
         return self.block.subsides_at if self.subsiding else self.block.end
 
 
@@ -154,6 +157,17 @@ class ActiveBlock:
         ):
             last = max(last, float(times[points.index("relax") if "relax" in points else -1]))
         return self.start + last
+
+    @property
+    def speaks_until(self) -> float:
+        """When all has ended but what only moves the face."""
+        if self.stopped_at is not None:
+            return self.stopped_at
+        moving = self.channels.keys() | self.shifts.keys()
+        times = self.schedule.times.items()
+        return self.start + max(
+            (float(t[-1]) for b, t in times if b in self.speech or b not in moving), default=0.0
+        )
 
     @property
     def earliest(self) -> float:

@@ -35,10 +35,15 @@ def dependencies(
         )
     ]
     links = ((p, wait) for p in named for wait in p.dependencies)
-    before = {id(w.block) for p, w in links if not w.subsiding and w.block.number < p.number}
+    before = {id(w.block) for p, w in links if not (w.subsiding or w.speaking) and w.block.number < p.number}
     waits = [Dependency(p) for p in named if id(p) not in before]
     chunks = (p for p in alive if p.number < number and p.block.id in block.chunk_after)
-    return waits + [Dependency(p, subsiding=True) for p in chunks]
+    speeches = (p for p in alive if p.block.id in block.speaks_after)
+    return [
+        *waits,
+        *(Dependency(p, subsiding=True) for p in chunks),
+        *(Dependency(p, speaking=True) for p in speeches),
+    ]
 
 
 def followers(block: Block) -> list[tuple[str, bool]]:

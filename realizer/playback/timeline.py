@@ -81,7 +81,8 @@ class BlockTimeline:
             block_links.with_stops(look, ended, now)
             for look in (self.blocks.schedule_of, self.blocks.first_schedule_of)
         )
-        existing = self._existing_claims(character, arrival.number if starts else 0, alive, now)
+        earlier = [p for p in alive if p.block.id in block.speaks_after]
+        existing = self._existing_claims(character, arrival.number if starts else 0, alive, now, earlier)
 
         def plan(others: Sequence[ActiveBlock]) -> Plan:
             return plan_block(
@@ -117,7 +118,8 @@ class BlockTimeline:
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
             active = self.blocks.active()
-            existing = block_links.existing_claims(playing.character, inf, active, blocks)
+            later = (p for p in playing.followers if playing.block.id in p.block.speaks_after)
+            existing = block_links.existing_claims(playing.character, inf, active, [*blocks, *later])
             if conflicts(claims(playing.block, at, self.kinds, playing.context), existing):
                 return True
         return False
@@ -171,10 +173,19 @@ class BlockTimeline:
     def resolve_conflicts(self, playing: ActiveBlock, now: float) -> bool:
         """Drop what a block that starts now needs and playing blocks have; return whether there was anything.
 
-        Its start event is due again then, or the block was stopped.
+        Its start event is due again then, or the block was stopped. The blocks whose speech it continues give
+        way to it.
         """
+        active = self.blocks.active()
+        earlier = [p for p in active if p.block.id in playing.block.speaks_after]
+        lost = {p: conflicts(p.plan.claims, playing.plan.claims) for p in earlier}
+        if any(lost.values()):
+            for other in filter(lost.get, earlier):
+                self.cut(other, {conflict.claim.behaviour for conflict in lost[other]}, now)
+            self.events.add(playing)
+            return True
         existing = self._existing_claims(
-            playing.character, playing.number, self.blocks.active(), now, without=[playing]
+            playing.character, playing.number, active, now, without=[playing, *earlier]
         )
         if not conflicts(playing.plan.claims, existing):
             return False

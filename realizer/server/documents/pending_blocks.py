@@ -62,7 +62,9 @@ class PendingBlock:
         """The ids of the blocks whose sync points, ends or parameters it names."""
         refs = (ref.block for ref in references(self.block))
         changes = (n.target[0] for n in self.block.behaviours if isinstance(n, ParameterValueChange))
-        return frozenset(refs).union(self.block.append_after, self.block.chunk_after, changes)
+        return frozenset(refs).union(
+            self.block.append_after, self.block.chunk_after, self.block.speaks_after, changes
+        )
 
     def precedes(self, id: str) -> bool:
         """Return whether it names a block in any way, which must not be there when this one is planned."""

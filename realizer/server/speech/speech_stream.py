@@ -34,7 +34,9 @@ class SpeechStream:
     partial_chunks: set[str] = field(default_factory=set)  # ids of blocks that speak only part of a sentence
     unplanned: list[str] = field(default_factory=list)  # ids of blocks that are not planned yet, in order
     scheduled: list[str] = field(default_factory=list)
-    words: list[str] = field(default_factory=list)  # the spoken words of blocks that have ended
+    words: dict[str, list[str]] = field(
+        default_factory=dict
+    )  # id of each block -> words, spoken when it ended
     is_announced: bool = False
     is_closed: bool = False
     is_finished: bool = False  # whether the speech was cut off
@@ -96,6 +98,7 @@ class SpeechStream:
         speech = next((node for node in block.behaviours if node.id == self.id), None)
         self.marks |= dict.fromkeys(getattr(speech, "marked", ()), block.id)
         self.unplanned.append(block.id)
+        self.words[block.id] = []
         if not is_clip and not is_sentence(piece) and (self.unspoken or not self.is_closed):
             self.partial_chunks.add(block.id)
         return block

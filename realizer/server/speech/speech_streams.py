@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import chain
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.playback.player import Player
@@ -31,7 +32,7 @@ class SpeechStreams:
     """The streaming speeches of a session.
 
     Block `ID` is a <wait> from the first chunk to the last: documents can follow, interrupt and replace it
-    like any block. Chunk k is block `ID.k` and starts when the previous one has ended.
+    like any block. Chunk k is block `ID.k` and starts when the speech of the previous one has ended.
     """
 
     def __init__(self, player: Player) -> None:
@@ -162,10 +163,12 @@ class SpeechStreams:
             has_syncs = any(map(self._is_speech_sync, references(block)))
             return with_references(block, self._chunk_reference) if has_syncs else block
         own = self._player.blocks.find(speech.id)
-        before = [id for id in speech.open_chunks if id != block.id]
-        if own is not None and own.is_waiting:
-            before += [dependency.block.block.id for dependency in own.dependencies]
-        return replace(block, append_after=tuple(before))
+        waits = own.dependencies if own is not None and own.is_waiting else ()
+        return replace(
+            block,
+            append_after=tuple(wait.block.block.id for wait in waits),
+            speaks_after=tuple(id for id in speech.open_chunks if id != block.id),
+        )
 
     def is_streaming(self, block: Block) -> bool:
         """Whether a block speaks part of a sentence that the next chunk continues."""
@@ -201,7 +204,7 @@ class SpeechStreams:
         if speech is None:
             return feedback, frozenset()
         if block != speech.id:
-            speech.words += self._words(block, feedback.global_time)
+            speech.words[block] = self._words(block, feedback.global_time)
             speech.on_done(block)
             speech.last_end = max(speech.last_end, feedback.global_time)
             return feedback, frozenset()
@@ -211,8 +214,8 @@ class SpeechStreams:
             self._forget(speech.id)
         if not speech.is_finished:
             return feedback, chunks
-        words = [word for chunk in speech.scheduled for word in self._words(chunk, feedback.global_time)]
-        return replace(feedback, said=" ".join([*speech.words, *words])), chunks
+        speech.words |= {chunk: self._words(chunk, feedback.global_time) for chunk in speech.scheduled}
+        return replace(feedback, said=" ".join(chain.from_iterable(speech.words.values()))), chunks
 
     @property
     def open_ids(self) -> list[str]:

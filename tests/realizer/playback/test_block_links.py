@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -94,6 +96,15 @@ def test_dependencies_by_list_are_of_any_character_and_known() -> None:
     everyone = [alive("a"), alive("b", character=1), alive("c")]
     said = 'bmla:appendAfter="b,nobody" bmla:chunkAfter="c"'
     assert ids(dependencies(block("x", said), 0, 2, everyone)) == [("b", False), ("c", True)]
+
+
+def test_dependencies_on_a_speech_leave_out_what_moves_the_face() -> None:
+    first = alive("a", start=1.0)
+    (wait,) = dependencies(replace(block("x"), speaks_after=("a", "nobody")), 0, 2, [first])
+    assert wait.until == first.start < first.end
+    later = alive("b", waits=[wait], number=2)
+    appended = dependencies(block("y", 'composition="APPEND"'), 0, 3, [first, later])
+    assert ids(appended) == [("a", False), ("b", False)], "either may end last"
 
 
 def test_followers_are_named_with_their_kind_of_dependency() -> None:

@@ -360,6 +360,46 @@ def test_speech_streams_continue_after_an_interrupted_chunk() -> None:
     assert at["turn:end"] == pytest.approx(0.7, abs=2e-3)
 
 
+def test_speech_streams_leave_no_gap_behind_an_expression() -> None:
+    driver = Talker()
+    driver.append('<faceLexeme lexeme="SMILE"/>One. Two. Three.', close=True)
+    at = times(driver.run(9))
+    assert [at[f"turn.{n}:start"] for n in (1, 2, 3)] == pytest.approx([0, EACH, 2 * EACH])
+    assert at["turn.1:b1:end"] > 3 * EACH
+    assert at["turn:end"] == pytest.approx(at["turn.1:b1:end"], abs=2e-3)
+
+
+def test_speech_streams_begin_a_clip_with_the_expression_before_it() -> None:
+    driver = Talker()
+    driver.session.receive(1, pack_clip(ClipPiece("c", 0, 8000, SLOW.tobytes())), driver.opened)
+    driver.collect()
+    driver.append('<faceLexeme lexeme="SMILE"/>', clip="c", close=True)
+    at = times(driver.run(9))
+    assert at["turn.1:b1:start"] == at["turn.2:start"] == 0
+
+
+@pytest.mark.parametrize("more", ["", ' ready="turn:m + 0.6"'])
+def test_speech_streams_end_a_motion_that_the_next_sentence_needs(more) -> None:
+    driver = Talker()
+    driver.append('One <sync id="m"/><gaze target="camera"/>two. ')
+    driver.append(f'<gaze target="camera"{more}/>Three four. ', close=True)
+    client = driver.run(9)
+    at = times(client)
+    assert at["turn.2:start"] == pytest.approx(EACH)
+    assert at["turn.1:b1:end"] == pytest.approx(EACH + 0.3, abs=0.01), "it relaxes"
+    assert "turn.2:b1:end" in at
+    assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
+
+
+def test_process_feedback_reports_spoken_words_in_order() -> None:
+    driver = Talker()
+    driver.append('<faceLexeme lexeme="SMILE"/>One. Two. Three four. Five. ')
+    driver.run(1.4)
+    driver.send({"type": "stop", "blocks": ["turn"]})
+    (end,) = (f for f in driver.run(3).feedback if getattr(f, "id", "") == "turn:end")
+    assert end.said == "One Two Three"
+
+
 def test_speech_streams_play_clips_between_texts() -> None:
     driver = Talker()
     sound = (np.arange(8000) % 9000).astype("<i2").tobytes()
@@ -411,7 +451,8 @@ def test_on_refused_ends_a_speech_with_the_id_of_a_block() -> None:
 ACTS = st.lists(
     st.one_of(
         st.tuples(
-            st.just("append"), st.sampled_from(["One. ", "Two", " three? ", '<sync id="m"/>', "", "..."])
+            st.just("append"),
+            st.sampled_from(["One. ", "Two", " three? ", '<sync id="m"/>', '<gaze target="camera"/>', "..."]),
         ),
         st.tuples(st.just("close"), st.just("")),
         st.tuples(st.just("stop"), st.sampled_from(["turn", "turn.1", "turn.2", "b"])),
