@@ -19,11 +19,11 @@ from realizer.playback.references import references
 from realizer.scheduling.timing import Warning
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.effects import Speak
-from realizer.server.speech.long_text import LongText, trim_final_pause
+from realizer.server.speech.long_text import LongText, spoken_length, trim_final_pause
 from realizer.speech.duration_fit import allow_small_warp, silent_fallback
 from realizer.speech.utterance import SpeechRequest, Utterance
 
-# Longer texts are synthesized in parts: espeak needs 15 ms for so many characters.
+# Longer texts are synthesized in parts: espeak needs 15 ms for so many spoken characters.
 SHORT = 160
 # The silent voice replaces one that has not answered by then.
 PATIENCE = 20.0  # s
@@ -277,7 +277,7 @@ class TtsRequests:
 
 def is_long(request: SpeechRequest) -> bool:
     """Whether a request should be synthesized in parts."""
-    return len(request.ssml) > SHORT and request.seconds is None and request.recording is None
+    return request.seconds is None and request.recording is None and spoken_length(request.ssml) > SHORT
 
 
 def block_limit_error(

@@ -82,7 +82,7 @@ class LongText:
         self._phonemes += [replace(p, start=p.start + start, end=p.end + start) for p in part.phonemes]
         self._marks |= {name: time + start for name, time in part.marks.items()}
         self.ready_until = start + part.duration
-        self._characters += len(TAG.sub("", self._current))
+        self._characters += spoken_length(self._current)
         missing_marks, missing_duration = self._estimate()
         return Utterance(
             duration=self.ready_until + missing_duration,
@@ -120,7 +120,12 @@ class LongText:
             return {}, 0.0
         text, done = self._request.ssml, self._characters
         marks = {name: self.ready_until + (at - done) * pace for name, at in _marks(text) if at >= done}
-        return marks, max(0, len(TAG.sub("", text)) - done) * pace
+        return marks, max(0, spoken_length(text) - done) * pace
+
+
+def spoken_length(text: str) -> int:
+    """Return the number of characters of a text without its tags."""
+    return len(TAG.sub("", text))
 
 
 def _parts(text: str) -> Iterator[str]:

@@ -115,6 +115,12 @@ def test_is_long_excludes_requests_of_given_length_and_recordings(request_, expe
     assert is_long(request_) is expected
 
 
+def test_is_long_counts_no_tags() -> None:
+    marked = f'<mark name="{"m" * SHORT}"/>' + 'x<mark name="m"/>' * SHORT
+    assert not is_long(SpeechRequest(marked))
+    assert is_long(SpeechRequest(f"{marked}x"))
+
+
 @pytest.fixture(scope="module")
 def voice():
     voice = EspeakVoice()
