@@ -21,6 +21,7 @@ BEHIND = 1e-3  # s
 SAME = 1e-6  # s
 # So many chunks are prepared ahead. An interruption makes the work for more useless.
 AHEAD = 6
+OPEN_CHUNKS = 20  # of a speech, with those that are spoken and whose expressions go on
 PARTS = 2  # of a clip that arrives, ahead of those: later, a part can be longer
 MOST = 500_000  # waiting characters of one speech; nine hours
 MAX_SPEECHES = 1_000  # of a session
@@ -255,7 +256,10 @@ class SpeechStreams:
             return False
         if not speech.is_announced:
             return True
-        ready = speech.has_piece and len(speech.open_chunks) < AHEAD
+        chunks = speech.open_chunks
+        begun = [p for p in map(self._player.blocks.find, chunks) if p is not None and p.has_begun]
+        ahead = len(chunks) - len(begun[1:])  # what was spoken before the last one that has begun may go on
+        ready = speech.has_piece and ahead < AHEAD and len(chunks) < OPEN_CHUNKS
         return ready and self._player.blocks.find(speech.id) is not None
 
     def _is_speech_sync(self, ref: SyncRef) -> bool:

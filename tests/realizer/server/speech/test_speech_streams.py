@@ -189,6 +189,14 @@ def test_next_prepares_a_few_chunks_ahead() -> None:
     assert at["turn:end"] == pytest.approx(20.0, abs=2e-3)
 
 
+def test_next_does_not_count_sentences_whose_expressions_go_on() -> None:
+    driver = Talker()
+    driver.append('<faceLexeme lexeme="SMILE" end="8"/>One. ' * 12, close=True)
+    assert len(driver.spoken) == speech_streams.AHEAD
+    at = times(driver.run(20))
+    assert [at[f"turn.{n}:start"] for n in range(1, 13)] == pytest.approx(EACH * np.arange(12))
+
+
 def test_is_streaming_shortens_pauses_inside_a_sentence() -> None:
     class Slow(Talker):
         """A voice that ends whatever it says as it ends a sentence."""
