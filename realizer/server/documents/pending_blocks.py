@@ -60,11 +60,9 @@ class PendingBlock:
     @cached_property
     def named(self) -> frozenset[str | None]:
         """The ids of the blocks whose sync points, ends or parameters it names."""
-        refs = (ref.block for ref in references(self.block))
-        changes = (n.target[0] for n in self.block.behaviours if isinstance(n, ParameterValueChange))
-        return frozenset(refs).union(
-            self.block.append_after, self.block.chunk_after, self.block.speaks_after, changes
-        )
+        block, refs = self.block, (ref.block for ref in references(self.block))
+        changes = (n.target[0] for n in block.behaviours if isinstance(n, ParameterValueChange))
+        return frozenset((*refs, *changes, *block.append_after, *block.chunk_after, *block.speaks_after))
 
     def precedes(self, id: str) -> bool:
         """Return whether it names a block in any way, which must not be there when this one is planned."""
