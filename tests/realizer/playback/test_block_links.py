@@ -14,7 +14,7 @@ from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
 from realizer.core.options import PlayOptions
 from realizer.playback import block_manager
-from realizer.playback.active_block import ActiveBlock, Dependency, State
+from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_links import (
     affected_blocks,
     all_dependencies,
@@ -25,7 +25,7 @@ from realizer.playback.block_links import (
     with_stops,
 )
 from realizer.playback.block_planner import plan
-from realizer.playback.block_states import BlockEvent
+from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.player import Player
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Phoneme, Utterance
