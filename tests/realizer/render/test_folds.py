@@ -71,6 +71,13 @@ def test_folds_of_a_region_show_with_their_own_unit(name, region, unit, others):
     assert max(amounts[1:]) < 0.35
 
 
+@pytest.mark.parametrize("name", FACES)
+def test_folds_of_the_chin_do_not_show_while_the_lips_are_rounded(name):
+    face = load_face(name)
+    spoken = pose(face, fap3=377, fap5=-200, fap6=-142, fap7=-142, fap16=330, fap17=320)
+    assert Folds(face).drives[face.maps.regions.index("chin_left")](spoken) == 0
+
+
 def test_folds_of_a_face_without_maps_are_none():
     assert not Folds(load_face("ada"))(load_face("ada").vertices).any()
 
