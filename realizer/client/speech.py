@@ -97,8 +97,7 @@ class OpenSpeech(ABC):
     ) -> None:
         self.id = id
         self.progress = SpeechProgress(id)
-        self._opening = dict(opening)
-        self._announced = False  # whether the service knows of it
+        self._opening: dict[str, Any] | None = dict(opening)  # None: the service knows of it
         self._control = control
         self._wait = wait
         self._closed = False
@@ -114,7 +113,7 @@ class OpenSpeech(ABC):
 
     async def stop(self) -> None:
         """Stop speaking at once."""
-        if not self._announced:  # the service cannot stop what it does not know
+        if self._opening is not None:  # the service cannot stop what it does not know
             await self._speech(append="")
         await self._control("stop", blocks=[self.id])
 
@@ -139,7 +138,7 @@ class OpenSpeech(ABC):
             await self.close()
 
     async def _speech(self, **fields: Any) -> None:
-        opening, self._opening, self._announced = self._opening, {}, True
+        opening, self._opening = self._opening or {}, None
         await self._control("speech", id=self.id, **opening, **fields)
 
     def _check_open(self) -> None:
