@@ -38,12 +38,16 @@ def dependencies(
     before = {id(w.block) for p, w in links if not (w.subsiding or w.speaking) and w.block.number < p.number}
     waits = [Dependency(p) for p in named if id(p) not in before]
     chunks = (p for p in alive if p.number < number and p.block.id in block.chunk_after)
-    speeches = (p for p in alive if p.block.id in block.speaks_after)
     return [
         *waits,
         *(Dependency(p, subsiding=True) for p in chunks),
-        *(Dependency(p, speaking=True) for p in speeches),
+        *(Dependency(p, speaking=True) for p in spoken_before(block, alive)),
     ]
+
+
+def spoken_before(block: Block, alive: Iterable[ActiveBlock]) -> list[ActiveBlock]:
+    """Return the blocks whose speech a block continues."""
+    return [p for p in alive if p.block.id in block.speaks_after]
 
 
 def followers(block: Block) -> list[tuple[str, bool]]:
@@ -214,13 +218,14 @@ def members(
 def _member(playing: ActiveBlock, origin: float, now: float, is_moved: bool, is_held: bool) -> Member:
     """Return one member; if it `is_held`, its behaviours that refer to nothing keep their starts."""
     delay = playing.start - origin
+    before = now if playing.has_begun or not is_moved else -inf
     passed_times: dict[str, dict[str, float]] = {}
-    for behaviour in playing.plan.timings:
+    for behaviour in playing.plan.timings if is_held or before > -inf else ():
         points, times = playing.schedule.points[behaviour], playing.schedule.times[behaviour]
         passed = {
             point: float(time) + delay
             for point, time in zip(points, times, strict=True)
-            if (playing.has_begun or not is_moved) and playing.start + float(time) <= now
+            if playing.start + float(time) <= before
         }
         if is_held and not playing.block[behaviour].references:
             passed[points[0]] = float(times[0]) + delay

@@ -81,7 +81,7 @@ class BlockTimeline:
             block_links.with_stops(look, ended, now)
             for look in (self.blocks.schedule_of, self.blocks.first_schedule_of)
         )
-        earlier = [p for p in alive if p.block.id in block.speaks_after]
+        earlier = block_links.spoken_before(block, alive)
         existing = self._existing_claims(character, arrival.number if starts else 0, alive, now, earlier)
 
         def plan(others: Sequence[ActiveBlock]) -> Plan:
@@ -177,7 +177,7 @@ class BlockTimeline:
         way to it.
         """
         active = self.blocks.active()
-        earlier = [p for p in active if p.block.id in playing.block.speaks_after]
+        earlier = block_links.spoken_before(playing.block, active)
         lost = {p: conflicts(p.plan.claims, playing.plan.claims) for p in earlier}
         if any(lost.values()):
             for other in filter(lost.get, earlier):
