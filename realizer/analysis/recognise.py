@@ -19,14 +19,6 @@ from realizer.emotions.profile import Profile, split_number
 from realizer.emotions.wheel import wheel
 from realizer.tables.emotions import emotion_model, ring
 
-# Smiles with parted lips, which the closed one of our own joy is unlike: action units with their intensities.
-OPEN_SMILES: tuple[Mapping[int, float], ...] = (
-    {6: 0.7, 10: 0.3, 12: 0.8, 25: 1.0},
-    {6: 0.6, 10: 0.9, 12: 0.8, 25: 1.0},
-    {6: 0.8, 12: 0.8, 25: 1.0, 26: 0.8},
-)
-LEAST_MOVED = 20.0  # FAPU; a profile of action units has no smaller FAPs
-
 
 @dataclass(frozen=True)
 class Interval:
@@ -160,7 +152,7 @@ def recogniser(profiles: str = "own") -> Recogniser:
     if profiles == "own":
         blends = [place for place in ring("paul").values() if place.kind == "advanced"]
         every += [replace(wheel(place.angle), name=place.name) for place in blends]
-        every += [_profile_of(f"joy {k}", units) for k, units in enumerate(OPEN_SMILES, 1)]
+        every += [_profile_of(f"joy {k}", units) for k, units in enumerate(emotion_model().smiles, 1)]
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     return Recogniser([*every, Profile("neutral", profiles, {})], strengths)
 
@@ -171,7 +163,11 @@ def _profile_of(name: str, units: Mapping[int, float]) -> Profile:
     values = to_fap(AUFrames(np.zeros(1), row[None])).values[0].astype(np.float64)
     spread = emotion_model().spread * np.abs(values)
     ranges = zip(values, values - spread, values + spread, strict=True)
-    moved = {fap: (float(a), float(b)) for fap, (v, a, b) in enumerate(ranges, 1) if abs(v) >= LEAST_MOVED}
+    moved = {
+        fap: (float(a), float(b))
+        for fap, (v, a, b) in enumerate(ranges, 1)
+        if abs(v) >= emotion_model().least_length
+    }
     return Profile(name, "own", moved)
 
 

@@ -127,6 +127,7 @@ class EmotionModel:
     window: float  # seconds over which frames are averaged
     unjudged: tuple[int, ...]  # FAPs that no feature point tells of alone
     strengths: tuple[float, ...]  # strengths at which our own profiles are recognised
+    smiles: tuple[Mapping[int, float], ...]  # AU -> intensity, of more faces that are recognised as joy
 
 
 @cache
@@ -135,6 +136,8 @@ def emotion_model() -> EmotionModel:
     table = tables.toml_table("emotion_model.toml")
     recognition = table["recognition"]
     recognition |= {name: tuple(recognition[name]) for name in ("unjudged", "strengths")}
+    smiles = [{int(unit): value for unit, value in face.items()} for face in recognition["smiles"]]
+    recognition["smiles"] = tuple(smiles)
     return EmotionModel(**table["wheel"], chosen=table["chosen"], **recognition)
 
 
