@@ -159,7 +159,10 @@ class Router:
             self._streams[key] = known | reply
         if reply["type"] == "error":
             # Without `where` it is about a text that could not be parsed.
-            is_answer = reply.get("where", f"{request}").partition(".")[0] in (request, "type")
+            where = reply.get("where", f"{request}").partition(".")[0]
+            # An older service does not know the type of the request.
+            unknown = where == "type" and reply["message"].endswith(f"got {json.dumps(request)}")
+            is_answer = where == request or unknown
         else:
             is_answer = request is not None and reply["type"] == ANSWERS.get(request)
         if is_answer and request is not None:

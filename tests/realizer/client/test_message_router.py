@@ -18,6 +18,7 @@ from realizer.client.message_router import (
     Router,
     is_blank,
 )
+from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.streams import JSON_STREAMS, KINDS
 from realizer.protocol.wire import WireError, WireFrame, pack
 
@@ -60,7 +61,17 @@ def test_router_logs_an_error_without_a_request_once(mail, caplog) -> None:
     assert record.getMessage() == "type: wanted another"
 
 
-@pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", "type", None])
+def test_router_tells_an_unknown_type_from_that_of_the_request(mail) -> None:
+    mail.expect_answer("ping")
+    mail.receive(parse_control('{"type": "stopp"}').model_dump_json())
+    assert not mail.has_answer
+    mail.expect_answer("save2")
+    mail.receive(parse_control('{"type": "save2"}').model_dump_json())
+    with pytest.raises(ClientError, match='got "save2"'):
+        mail.answer()
+
+
+@pytest.mark.parametrize("where", ["subscribe.stream", "subscribe", None])
 def test_router_raises_the_error_of_a_request(mail, where) -> None:
     mail.expect_answer("subscribe")
     mail.receive(error(where))
