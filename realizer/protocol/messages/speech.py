@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, Literal
 
 from pydantic import AliasChoices, Field, field_validator, model_validator
@@ -10,6 +11,7 @@ from realizer.protocol.messages.common import Message, examples
 
 # Longest text of one `speech` message; a speech may have any number of them.
 MAX_APPEND = 20_000  # characters
+_CAPITAL = re.compile("[A-Z]")  # of other alphabets, such as ARPABET and SAMPA
 
 
 class TimedText(Message):
@@ -78,4 +80,7 @@ class SpeechMessage(Message):
             raise ValueError("wanted the clip that this describes")
         if self.phonemes and self.visemes:
             raise ValueError("wanted phonemes or visemes, got both")
+        for phoneme in self.phonemes:
+            if _CAPITAL.search(phoneme.text):
+                raise ValueError(f"phonemes: wanted IPA, which has no capitals, got {phoneme.text!r}")
         return self

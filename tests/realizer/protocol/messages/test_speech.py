@@ -16,6 +16,7 @@ from realizer.protocol.messages.replies import ErrorMessage
         (',"id":"t","words":[]', ""),
         (',"id":"t","text":"Hello"', "the clip that this describes"),
         (',"clip":"c","phonemes":[{"start":0,"ipa":"p"}],"visemes":[{"start":0,"viseme":1}]', "got both"),
+        (',"clip":"c","phonemes":[{"start":0,"ipa":"AH0"}]', "wanted IPA, which has no capitals, got 'AH0'"),
         (',"clip":"c","words":[{"start":-1,"text":"a"}]', "wanted at least 0; got -1"),
         (',"id":"t 1","append":"x"', "a string that matches"),
     ],
