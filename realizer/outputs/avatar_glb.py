@@ -42,7 +42,9 @@ def encode_avatar(realization: Realization, avatar: Avatar) -> bytes:
         _split(document["nodes"][node])
         keys.append((node, "rotation", _in_parent(turned[bone], avatar, node)))
     animation = file.animation("performance", clock, keys)
-    return file.bytes_of({**document, "animations": [animation, *document.get("animations", ())]})
+    # A file of ours already has an animation of that name, which the new one replaces.
+    others = [a for a in document.get("animations", ()) if a.get("name") != animation["name"]]
+    return file.bytes_of({**document, "animations": [animation, *others]})
 
 
 def _weights(

@@ -71,6 +71,14 @@ def test_avatar_turns_its_eyes_in_the_head(played, shown):
     np.testing.assert_allclose(seen["frames"][-1]["leftEye"], turned(played, frame, at, head), atol=1e-5)
 
 
+def test_avatar_of_an_earlier_run_has_the_new_animation_alone(played, tmp_path):
+    (tmp_path / "mine.glb").write_bytes(avatars.avatar())
+    first = played.save(tmp_path / "first.glb", avatar=tmp_path / "mine.glb")
+    again = played.save(tmp_path / "again.glb", avatar=first)
+    document, _ = read_glb(again.read_bytes())
+    assert [animation["name"] for animation in document["animations"]] == ["performance"]
+
+
 def test_avatar_of_vrm_0_looks_back(played, shown):
     content = avatars.avatar(("a",), vrm=0, expressions={"aa": "a"})
     seen = shown(content)["frames"]
