@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from typing import Literal
 
 import numpy as np
 
@@ -28,19 +29,21 @@ from realizer.speech.utterance import Utterance
 SAME = 1e-9  # s
 
 
+# Attribute of a block -> the time for which another block waits.
+BlockMoment = Literal["end", "subsides_at", "speaks_until"]
+
+
 @dataclass(frozen=True, eq=False)
 class Dependency:
     """A block that another one waits for: for its end, until it subsides, or until its speech is over."""
 
     block: ActiveBlock
-    subsiding: bool = False
-    speaking: bool = False
+    moment: BlockMoment = "end"
 
     @property
     def until(self) -> float:
-        if self.speaking:
-            return self.block.speaks_until
-        return self.block.subsides_at if self.subsiding else self.block.end
+        time: float = getattr(self.block, self.moment)
+        return time
 
 
 @dataclass(eq=False)

@@ -7,7 +7,7 @@ from math import inf
 
 from bml_schema import Block
 from realizer.playback import block_links
-from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.active_block import ActiveBlock, BlockMoment, Dependency
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.block_store import BlockStore
 from realizer.scheduling.timing import Warning
@@ -96,18 +96,20 @@ class AnnouncedBlocks:
         waits = block_links.dependencies(block, announced.character, announced.number, active)
         return waits + placed_before
 
-    def links(self, announced: AnnouncedBlock) -> tuple[list[Dependency], list[tuple[ActiveBlock, bool]]]:
+    def links(
+        self, announced: AnnouncedBlock
+    ) -> tuple[list[Dependency], list[tuple[ActiveBlock, BlockMoment]]]:
         """Return the dependencies of a block, and the accepted blocks that have to wait for it.
 
         Raises:
             BlockRejectedError: one of the latter has started, or is itself a dependency.
         """
         id_of_block, waits = announced.block.id, self.dependencies(announced)
-        waiting: list[tuple[ActiveBlock, bool]] = []
-        for name, subsiding in block_links.followers(announced.block):
+        waiting: list[tuple[ActiveBlock, BlockMoment]] = []
+        for name, moment in block_links.followers(announced.block):
             playing = self._blocks.find(name)
             if playing is not None and playing.is_waiting:
-                waiting.append((playing, subsiding))
+                waiting.append((playing, moment))
             elif playing is not None or name not in announced.unstarted:
                 text = f"prependBefore, chunkBefore: wanted blocks that have not started, got {name!r}"
                 raise BlockRejectedError(Warning(id_of_block, "TargetBlockAlreadyStartedException", text))
@@ -118,10 +120,10 @@ class AnnouncedBlocks:
 
     def place_after(self, playing: ActiveBlock) -> None:
         """Let earlier announced blocks wait for an accepted one that is put before them."""
-        for name, subsiding in block_links.followers(playing.block):
+        for name, moment in block_links.followers(playing.block):
             other = self._announced.get(name)
             if other is not None and other.number < playing.number:
-                other.dependencies.append(Dependency(playing, subsiding))
+                other.dependencies.append(Dependency(playing, moment))
 
     def _has_not_started(self, id: str) -> bool:
         """Whether a block has been announced or planned, and has not started, was revoked or refused."""

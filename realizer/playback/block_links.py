@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from bml_schema import Block, SyncRef
-from realizer.playback.active_block import ActiveBlock, Dependency
+from realizer.playback.active_block import ActiveBlock, BlockMoment, Dependency
 from realizer.playback.block_store import ANTICIPATORS
 from realizer.playback.references import external_refs, references
 from realizer.playback.resources import ResourceClaim
@@ -35,13 +35,13 @@ def dependencies(
         )
     ]
     links = ((p, wait) for p in named for wait in p.dependencies)
-    before = {id(w.block) for p, w in links if not (w.subsiding or w.speaking) and w.block.number < p.number}
+    before = {id(w.block) for p, w in links if w.moment == "end" and w.block.number < p.number}
     waits = [Dependency(p) for p in named if id(p) not in before]
     chunks = (p for p in alive if p.number < number and p.block.id in block.chunk_after)
     return [
         *waits,
-        *(Dependency(p, subsiding=True) for p in chunks),
-        *(Dependency(p, speaking=True) for p in spoken_before(block, alive)),
+        *(Dependency(p, "subsides_at") for p in chunks),
+        *(Dependency(p, "speaks_until") for p in spoken_before(block, alive)),
     ]
 
 
@@ -50,9 +50,12 @@ def spoken_before(block: Block, alive: Iterable[ActiveBlock]) -> list[ActiveBloc
     return [p for p in alive if p.block.id in block.speaks_after]
 
 
-def followers(block: Block) -> list[tuple[str, bool]]:
-    """Return (id, subsiding) of the blocks that have to wait for this one, or only for its subsiding."""
-    return [(id, False) for id in block.prepend_before] + [(id, True) for id in block.chunk_before]
+def followers(block: Block) -> list[tuple[str, BlockMoment]]:
+    """Return the ids of the blocks that have to wait for this one, with its moment that they wait for."""
+    return [
+        *((id, "end") for id in block.prepend_before),
+        *((id, "subsides_at") for id in block.chunk_before),
+    ]
 
 
 def existing_claims(

@@ -129,8 +129,8 @@ class BlockManager:
         self.timeline.place(playing)
         if any(wait.block.order > playing.order for wait in waits):
             self.timeline.reorder(playing)
-        for follower, subsiding in ((p, s) for p, s in waiting if not p.is_done):
-            follower.add_dependency(Dependency(playing, subsiding))
+        for follower, moment in ((p, m) for p, m in waiting if not p.is_done):
+            follower.add_dependency(Dependency(playing, moment))
             self.timeline.reorder(follower)
         self._announced.place_after(playing)
         self.timeline.predict(playing, now)

@@ -111,7 +111,7 @@ def test_scale_changes_channels_or_sound() -> None:
 
 def test_earliest_start_is_after_all_dependencies() -> None:
     first, second = playing(), playing()
-    second.add_dependency(Dependency(first, subsiding=True))
+    second.add_dependency(Dependency(first, "subsides_at"))
     assert second.earliest == 12.0
     second.add_dependency(Dependency(first))
     assert second.earliest == 13.0

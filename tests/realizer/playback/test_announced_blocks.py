@@ -79,7 +79,7 @@ def test_links_are_dependencies_and_blocks_that_wait(store, announced) -> None:
     added = announced.add(block("c", 'bmla:appendAfter="a" bmla:prependBefore="b"'), 0)
     waits, waiting = announced.links(added)
     assert [wait.block for wait in waits] == [first]
-    assert waiting == [(second, False)]
+    assert waiting == [(second, "end")]
 
 
 @pytest.mark.parametrize("event", [None, BlockEvent.START])

@@ -50,7 +50,7 @@ def alive(
 
 
 def ids(waits: list[Dependency]) -> list[tuple[str, bool]]:
-    return [(w.block.block.id, w.subsiding) for w in waits]
+    return [(w.block.block.id, w.moment == "subsides_at") for w in waits]
 
 
 def test_dependencies_of_append_are_only_the_last_of_a_chain() -> None:
@@ -78,7 +78,7 @@ def test_dependencies_of_append_name_what_was_put_before_an_earlier_block() -> N
 
 def test_dependencies_on_the_end_and_the_subsiding_are_both_named() -> None:
     first = alive("a")
-    second = alive("b", waits=[Dependency(first, subsiding=True)])
+    second = alive("b", waits=[Dependency(first, "subsides_at")])
     assert len(dependencies(block("x", 'composition="APPEND"'), 0, 2, [first, second])) == 2
 
 
@@ -86,7 +86,7 @@ def test_all_dependencies_follow_any_chain() -> None:
     chain = [alive("a")]
     for name in "bcd":
         chain.append(alive(name, waits=[Dependency(chain[-1])]))
-    assert all_dependencies([Dependency(chain[2], subsiding=True)]) == set(map(id, chain[:3]))
+    assert all_dependencies([Dependency(chain[2], "subsides_at")]) == set(map(id, chain[:3]))
     circle = alive("e", waits=[Dependency(chain[3])])
     chain[0].dependencies.append(Dependency(circle))
     assert all_dependencies([Dependency(circle)]) == set(map(id, [*chain, circle]))
@@ -107,9 +107,9 @@ def test_dependencies_on_a_speech_leave_out_what_moves_the_face() -> None:
     assert ids(appended) == [("a", False), ("b", False)], "either may end last"
 
 
-def test_followers_are_named_with_their_kind_of_dependency() -> None:
+def test_followers_are_named_with_their_moment() -> None:
     said = 'bmla:prependBefore="a" bmla:chunkBefore="b"'
-    assert followers(block("x", said)) == [("a", False), ("b", True)]
+    assert followers(block("x", said)) == [("a", "end"), ("b", "subsides_at")]
 
 
 def test_existing_claims_are_those_of_the_others_of_a_character() -> None:
