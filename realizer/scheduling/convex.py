@@ -10,6 +10,7 @@ from realizer.core import work
 from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.graphs import UnionFind, components, longest_path_levels
 from realizer.scheduling.model import LOOSE, TIGHT, Index
+from realizer.scheduling.quadratic_program import minimum
 from realizer.scheduling.rigid_clusters import least_squares
 
 # Active sets tried before the interior point method, which is rarely needed.
@@ -226,7 +227,6 @@ def _forces(pull: list[float], beside: dict[int, list[tuple[int, int]]], quadrat
 def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | None:
     """Return Clarabel's solution x (m,), with force and slack of each inequality, or None if it fails."""
     work.count(100 * quadratic.size)
-    import clarabel
     from scipy.sparse import csc_array
 
     m = quadratic.size
@@ -245,19 +245,22 @@ def _interior_point(quadratic: Quadratic) -> tuple[Float64, Float64, Float64] | 
     ones, count = np.ones(len(rows)), np.arange(len(rows))
     ends = np.concatenate([count, count]), np.concatenate([u, v])
     matrix = csc_array((np.concatenate([ones, -ones]), ends), shape=(len(rows), m))[:, 1:]
-    cones = [clarabel.NonnegativeConeT(len(rows))]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    # It only makes the solution more accurate than is needed.
-    settings.iterative_refinement_enable = False
-    # Close enough to tell active inequalities from those that are merely near.
-    settings.tol_gap_abs = settings.tol_gap_rel = 1e-11
     # Matrices of -1, 0 and 1 do not need Clarabel's scaling, which sometimes makes it fail; in rare cases it
     # only succeeds with it.
     for scaled in (False, True):
-        settings.equilibrate_enable = scaled
-        solver = clarabel.DefaultSolver(upper, linear, matrix, -w, cones, settings)
-        solution = work.call_native(solver.solve) if m > SMALL else solver.solve()
+        solution = minimum(
+            upper,
+            linear,
+            matrix,
+            -w,
+            in_thread=m > SMALL,
+            equilibrate_enable=scaled,
+            # It only makes the solution more accurate than is needed.
+            iterative_refinement_enable=False,
+            # Close enough to tell active inequalities from those that are merely near.
+            tol_gap_abs=1e-11,
+            tol_gap_rel=1e-11,
+        )
         # Rounding limits the accuracy; the active set is solved again exactly.
         if str(solution.status) in ("Solved", "AlmostSolved", "InsufficientProgress"):
             force, room = np.zeros(len(quadratic.u)), np.ones(len(quadratic.u))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -16,13 +15,14 @@ from realizer.core.array_types import Bool, Float64
 from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import Index, Model
 from realizer.scheduling.problem import ORIGIN
+from realizer.scheduling.quadratic_program import symmetric_solution
 
 # Lengths that differ by less than this count as equal.
 FITS = 1e-9  # s
 # From this many unknowns on a sparse factorisation is as fast; and OpenBLAS starts threads for a dense one of
 # 90, which costs hundreds of milliseconds if the cores are busy.
 SPARSE_FROM = 64
-# From this many unknowns on other work goes on while a matrix is factorised.
+# From this many unknowns on Clarabel is faster than SuperLU, and other work goes on meanwhile.
 MANY = 2_000
 
 
@@ -178,19 +178,22 @@ def least_squares(
     between = (i < n) & (j < n)
     one, other, stiff = i[between], j[between], -stiffness[between]
     whole = (np.bincount(i, stiffness, n + 1) + np.bincount(j, stiffness, n + 1))[:n]
-    rows, columns = np.concatenate([one, other, all_free]), np.concatenate([other, one, all_free])
-    values = np.concatenate([stiff, stiff, whole])
-    if n < SPARSE_FROM:
-        matrix = np.bincount(rows * n + columns, values, n * n).reshape(n, n)
-        found = np.linalg.solve(matrix, right)
+    if n > MANY:
+        low, high = np.minimum(one, other), np.maximum(one, other)
+        triangle = np.concatenate([low, all_free]), np.concatenate([high, all_free])
+        found = symmetric_solution(triangle, np.concatenate([stiff, whole]), right.astype(float))
     else:
-        from scipy.sparse import csc_array
-        from scipy.sparse.linalg import splu
+        rows, columns = np.concatenate([one, other, all_free]), np.concatenate([other, one, all_free])
+        values = np.concatenate([stiff, stiff, whole])
+        if n < SPARSE_FROM:
+            matrix = np.bincount(rows * n + columns, values, n * n).reshape(n, n)
+            found = np.linalg.solve(matrix, right)
+        else:
+            from scipy.sparse import csc_array
+            from scipy.sparse.linalg import splu
 
-        sparse = csc_array((values, (rows, columns)), shape=(n, n))
-        factorise = partial(splu, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
-        factors = work.call_native(factorise, sparse) if n > MANY else factorise(sparse)
-        found = factors.solve(right)
+            sparse = csc_array((values, (rows, columns)), shape=(n, n))
+            found = splu(sparse, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(right)
     y = x.copy()
     y[free] = found
     return y

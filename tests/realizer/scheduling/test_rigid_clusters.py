@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from realizer.scheduling.rigid_clusters import SPARSE_FROM, least_squares
+from realizer.scheduling.rigid_clusters import MANY, SPARSE_FROM, least_squares
 
 
-@pytest.mark.parametrize("size", [3, SPARSE_FROM, 5 * SPARSE_FROM])
+@pytest.mark.parametrize("size", [3, SPARSE_FROM, 5 * SPARSE_FROM, MANY + 500])
 def test_least_squares_balances_forces_at_every_free_node(size: int) -> None:
     rng = np.random.default_rng(size)
     i = np.concatenate([np.arange(size - 1), rng.integers(0, size, size)])
