@@ -2,111 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import pytest
 
 from bml_schema import parse
-from realizer.animation.channel import Gain
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import State
-from realizer.playback.scheduled_speech import SPEECH_FADE
-from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import SpeechRequest, Utterance
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
 
-def playing(
-    inside: str = FACE, start: float = 10.0, utterances: Mapping[str, Utterance] | None = None
-) -> ActiveBlock:
-    context = PlanningContext(utterances=utterances or {})
-    planned = plan(parse(f'<bml id="a">{inside}</bml>'), KINDS, context, start=start)
-    made = ActiveBlock(planned, KINDS, context, character=0, number=0, not_before=start, state=State.IN_EXEC)
-    made.apply_plan(planned, start, start)
+def playing(state: State = State.IN_EXEC) -> ActiveBlock:
+    context = PlanningContext()
+    planned = plan(parse(f'<bml id="a">{FACE}</bml>'), KINDS, context, start=10.0)
+    made = ActiveBlock(planned, KINDS, context, character=0, number=0, not_before=10.0, state=state)
+    made.apply_plan(planned, 10.0, 10.0)
     return made
 
 
-def test_apply_plan_at_another_start_moves_channels_claims_and_ends() -> None:
-    made = playing('<gaze id="g" target="x" start="0" ready="0.5" relax="1" end="2"/>')
-    (claim,) = made.plan.claims
-    assert (claim.begin, claim.end, made.end) == (10.0, 11.0, 12.0)
-    made.apply_plan(made.plan, 20.0, 12.0)
-    (claim,) = made.plan.claims
-    assert (claim.begin, claim.end, made.end) == (20.0, 21.0, 22.0)
-    assert {c.span[0] for c in made.moving_channels()} == {20.0}
-    assert {motion.known for motion in made.known_motions()} == {12.0}
-
-
-def test_apply_plan_that_moves_nothing_keeps_since_when_it_is_known() -> None:
-    made = playing()
-    made.apply_plan(made.plan, 10.0, 5.0)
-    assert {motion.known for motion in made.known_motions()} == {10.0}
-
-
-def test_active_block_shows_nothing_before_its_start_is_known() -> None:
-    made = playing()
-    made.apply_plan(made.plan, float("inf"), 10.0)
-    assert not list(made.moving_channels())
-    assert made.end == float("inf")
-
-
-@pytest.mark.parametrize(
-    ("at", "points", "times"),
-    [
-        (9.0, None, None),
-        (10.2, ("start", "relax", "end"), [0.0, 0.2, 0.5]),
-        (11.0, ("start", "attackPeak", "relax", "end"), [0.0, 0.5, 1.0, 1.3]),
-        (12.9, ("start", "attackPeak", "relax", "end"), [0.0, 0.5, 2.0, 3.0]),
-        (13.5, ("start", "attackPeak", "relax", "end"), [0.0, 0.5, 2.0, 3.0]),
-    ],
-)
-def test_cut_keeps_past_points_then_relaxes_and_ends(
-    at: float, points: tuple[str, ...] | None, times: list[float] | None
-) -> None:
-    made = playing()
-    made.cut(["s"], at)
-    assert made.schedule.points.get("s") == points
-    if times is not None:
-        assert list(made.schedule.times["s"]) == pytest.approx(times)
-
-
-def test_cut_removes_behaviours_that_have_not_begun() -> None:
-    made = playing()
-    made.cut(["s"], 10.0)
-    assert not any(c.span[0] < c.span[1] for c in made.moving_channels())
-    assert made.end == 10.0
-
-
-def test_cut_fades_the_lips_of_a_speech_that_has_not_begun() -> None:
-    spoken = SilentVoice().say(SpeechRequest("Five six"))
-    made = playing('<speech id="s" start="1"><text>Five six</text></speech>', utterances={"s": spoken})
-    lips = {c.target for c in made.moving_channels() if c.span[0] < 10.95}
-    assert lips
-    made.cut(["s"], 10.95)
-    fading = {c.target: c.span for c in made.moving_channels() if c.gains}
-    assert set(fading) == lips
-    assert max(last for _, last in fading.values()) == pytest.approx(10.95 + SPEECH_FADE)
-    assert "s" not in made.schedule.times
-    assert not made.speech["s"].is_heard
-
-
-def test_cut_ends_the_named_behaviours_only() -> None:
-    made = playing(FACE + FACE.replace('"s"', '"t"'))
-    made.cut(["s"], 11.0)
-    assert made.unfinished(12.0) == {"t"}
-    assert made.end == 13.0
-
-
-def test_scale_changes_channels_or_sound() -> None:
-    made = playing()
-    made.scale("s", [Gain(10.0, 11.0, 0.5)], sound=False)
-    assert all(c.gains for c in made.moving_channels())
-    made.scale("s", [Gain(10.0, 11.0, 0.5)], sound=True)  # a smile has no sound
-    assert not made.speech
+@pytest.mark.parametrize("state", [State.LURKING, State.IN_EXEC])
+def test_cut_plans_a_waiting_block_again_without_what_was_removed(state: State) -> None:
+    made = playing(state)
+    assert made.cut(["s"], 9.0) == ["s"]
+    assert [node.id for node in made.block.behaviours] == ([] if state is State.LURKING else ["s"])
 
 
 def test_earliest_start_is_after_all_dependencies() -> None:
