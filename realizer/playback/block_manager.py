@@ -24,7 +24,8 @@ from realizer.playback.feedback_events import (
     progress,
     sync_progress,
 )
-from realizer.playback.timeline import Arrival, BlockTimeline
+from realizer.playback.joint_planner import Arrival
+from realizer.playback.timeline import BlockTimeline
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance
 
@@ -110,7 +111,7 @@ class BlockManager:
         pending = block.preplan and not announced.activated
         start = inf if pending else max([now, *(w.until for w in waits)])
         arrival = Arrival(block, character, announced.number, context)
-        planned, others = self.timeline.plan(arrival, start, now, waits=waits, ended=ended)
+        planned, others = self.timeline.planner.plan(arrival, start, now, waits=waits, ended=ended)
         if planned.schedule.lengths:
             return planned.schedule
         self._announced.pop(block.id)

@@ -4,37 +4,24 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from graphlib import TopologicalSorter
 from math import inf
 
-from bml_schema import Block
-from realizer.behaviours.kind import BehaviourKind, PlanningContext
-from realizer.core import work
+from realizer.behaviours.kind import BehaviourKind
 from realizer.playback import block_links
-from realizer.playback.active_block import ActiveBlock, Dependency
-from realizer.playback.block_links import affected_blocks, members
+from realizer.playback.active_block import ActiveBlock
+from realizer.playback.block_links import affected_blocks
 from realizer.playback.block_planner import Plan
-from realizer.playback.block_planner import plan as plan_block
 from realizer.playback.block_states import BlockEvent
 from realizer.playback.block_store import BlockStore
 from realizer.playback.character import Character
 from realizer.playback.feedback_events import EventQueue, Reports, prediction, progress
-from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts
-from realizer.scheduling import schedule_together
+from realizer.playback.joint_planner import Arrival, JointPlanner
+from realizer.playback.resources import conflicts
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.duration_fit import shortened
 from realizer.speech.utterance import Utterance
-
-
-@dataclass(frozen=True)
-class Arrival:
-    """A block to be planned, the index of its character, and its number by order of arrival."""
-
-    block: Block
-    character: int
-    number: int
-    context: PlanningContext
 
 
 class BlockTimeline:
@@ -45,84 +32,10 @@ class BlockTimeline:
         self.characters = characters
         self.version = 0
         self.blocks = BlockStore()
+        self.planner = JointPlanner(kinds, self.blocks)
         self.events = EventQueue()
         self.reports = Reports()
         self._moving: set[ActiveBlock] = set()
-
-    def plan(
-        self,
-        arrival: Arrival,
-        start: float,
-        now: float,
-        *,
-        waits: Collection[Dependency] = (),
-        ended: Collection[ActiveBlock] = (),
-        alone: bool = False,
-        starts: bool = False,
-        may_stretch: bool = True,
-    ) -> tuple[Plan, list[ActiveBlock]]:
-        """Plan a block beside the active ones; return the plan, and the blocks that are solved with it.
-
-        While its start is unknown, it is planned as if it started now, and does not move other blocks.
-        Conflicts with blocks that wait are resolved when it starts, because they may still move.
-
-        Args:
-            waits, ended: the blocks that it waits for, and those that it ends.
-            alone: sync points of other blocks are fixed.
-            starts: whether its start event is due.
-            may_stretch: whether the plan may require speech of other lengths.
-        """
-        block, character = arrival.block, arrival.character
-        known = start < inf
-        origin = start if known else now
-        alive = [p for p in self.blocks.active() if p not in ended and p.block.id != block.id]
-        others = affected_blocks(block, alive, now, waits) if known and not alone else []
-        schedule_of, first_schedule_of = (
-            block_links.with_stops(look, ended, now)
-            for look in (self.blocks.schedule_of, self.blocks.first_schedule_of)
-        )
-        earlier = block_links.spoken_before(block, alive)
-        existing = self._existing_claims(character, arrival.number if starts else 0, alive, now, earlier)
-
-        def plan(others: Sequence[ActiveBlock]) -> Plan:
-            return plan_block(
-                block,
-                self.kinds,
-                arrival.context,
-                start=origin,
-                external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
-                existing_claims=existing if start <= now else (),
-                others=members(others, origin, now, new=block),
-                may_stretch=may_stretch,
-            )
-
-        planned = plan(others)
-        if planned.other_schedules and self._conflict(others, planned.other_schedules):
-            return plan([]), []
-        return planned, others
-
-    def _existing_claims(
-        self,
-        character: int,
-        number: int,
-        alive: Sequence[ActiveBlock],
-        now: float,
-        without: Collection[ActiveBlock] = (),
-    ) -> list[ResourceClaim]:
-        """Return the claims that a block gives way to, after the interrupts that all will make."""
-        known = (p for p in alive if p.start < inf)
-        promised = (cut for p in known for cut in interrupts(p.block, p.schedule) if cut[0] >= now)
-        return after_interrupts(block_links.existing_claims(character, number, alive, without), promised)
-
-    def _conflict(self, blocks: Sequence[ActiveBlock], schedules: Sequence[Schedule]) -> bool:
-        for playing, schedule in zip(blocks, schedules, strict=True):
-            at = replace(schedule, start=playing.start)
-            active = self.blocks.active()
-            later = (p for p in playing.followers if playing.block.id in p.block.speaks_after)
-            existing = block_links.existing_claims(playing.character, inf, active, [*blocks, *later])
-            if conflicts(claims(playing.block, at, self.kinds, playing.context), existing):
-                return True
-        return False
 
     def place(self, playing: ActiveBlock) -> None:
         self.characters[playing.character].add_shifts(playing.shifts.values())
@@ -184,7 +97,7 @@ class BlockTimeline:
                 self.cut(other, {conflict.claim.behaviour for conflict in lost[other]}, now)
             self.events.add(playing)
             return True
-        existing = self._existing_claims(
+        existing = self.planner.existing_claims(
             playing.character, playing.number, active, now, without=[playing, *earlier]
         )
         if not conflicts(playing.plan.claims, existing):
@@ -243,7 +156,7 @@ class BlockTimeline:
     ) -> tuple[Plan | None, list[ActiveBlock]]:
         """Plan a waiting block again, and report new warnings; stop it and return None if it is refused."""
         arrival = Arrival(playing.block, playing.character, playing.number, playing.context)
-        planned, others = self.plan(
+        planned, others = self.planner.plan(
             arrival, start, now, waits=playing.dependencies, alone=alone, starts=starts, may_stretch=False
         )
         if planned.schedule.failed:
@@ -314,17 +227,11 @@ class BlockTimeline:
 
     def _retime_together(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> str | None:
         """Change the times of playing blocks to the best fit; if there is none, return why."""
-        together = members(blocks, origin, now, is_moved=True)
-        instants = block_links.external_times(self.blocks.schedule_of, origin, self.blocks.first_schedule_of)
-        try:
-            with work.limited(blocks[0].context.max_planning):
-                schedules = schedule_together(together, outside=instants)
-        except work.WorkLimitError as error:
-            return str(error)
-        if not schedules[0].failed and not self._conflict(blocks, schedules):
-            self.retime(blocks, schedules, now)
-            return None
-        return schedules[0].warnings[0].text if schedules[0].failed else "it would disturb another block"
+        fitted = self.planner.fit(blocks, origin, now)
+        if isinstance(fitted, str):
+            return fitted
+        self.retime(blocks, fitted, now)
+        return None
 
     def stop(self, playing: ActiveBlock, now: float, others: Collection[ActiveBlock] = ()) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported.

@@ -13,14 +13,15 @@ from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.character import Character
-from realizer.playback.timeline import Arrival, BlockTimeline
+from realizer.playback.joint_planner import Arrival
+from realizer.playback.timeline import BlockTimeline
 
 
 def taken_in(
     course: BlockTimeline, id: str, after: ActiveBlock | None = None, state: State = State.LURKING
 ) -> ActiveBlock:
     block = parse(f'<bml id="{id}"><wait id="w" duration="2"/></bml>')
-    planned, _ = course.plan(Arrival(block, 0, 1, PlanningContext()), 0.0, 0.0)
+    planned, _ = course.planner.plan(Arrival(block, 0, 1, PlanningContext()), 0.0, 0.0)
     waits = [] if after is None else [Dependency(after)]
     made = ActiveBlock(planned, KINDS, PlanningContext(), 0, course.blocks.new_number(), 0.0, waits, state)
     made.apply_plan(planned, made.earliest, 0.0)
