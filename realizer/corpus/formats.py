@@ -31,6 +31,7 @@ from realizer.corpus.recording import (
     read_faps,
 )
 from realizer.face.features import fapu_of
+from realizer.outputs.speech_spans import Span
 from realizer.outputs.textgrid import intervals_text
 from realizer.tables import faps
 from realizer.tables.arkit_names import shapes
@@ -102,8 +103,11 @@ def write_annotations(path: Path, recording: Recording) -> None:
         tiers.setdefault(tier, []).append(one)
     if path.suffix.lower() not in (".eaf", ".textgrid"):
         raise CorpusError(f"{path}: wanted a name that ends in .eaf or .TextGrid")
-    elan = path.suffix.lower() == ".eaf"
-    path.write_text(_eaf(tiers) if elan else intervals_text(tiers, recording.frames / recording.fps), "utf-8")
+    if path.suffix.lower() == ".eaf":
+        path.write_text(_eaf(tiers), "utf-8")
+        return
+    spans = {name: [Span(one.start, one.end, one.text) for one in tier] for name, tier in tiers.items()}
+    path.write_text(intervals_text(spans, recording.frames / recording.fps), "utf-8")
 
 
 def merged(recording: Recording, part: Recording) -> Recording:

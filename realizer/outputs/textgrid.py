@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
-from typing import Protocol
 
 from realizer.outputs import speech_spans
 from realizer.outputs.output import text_output
@@ -10,17 +9,6 @@ from realizer.outputs.speech_spans import Span
 from realizer.realization import Realization
 
 DIGITS = 6  # decimals: microseconds
-
-
-class TextSpan(Protocol):
-    """A text and its seconds."""
-
-    @property
-    def start(self) -> float: ...
-    @property
-    def end(self) -> float: ...
-    @property
-    def text(self) -> str: ...
 
 
 def encode_textgrid(realization: Realization) -> str:
@@ -45,7 +33,7 @@ def encode_textgrid(realization: Realization) -> str:
     return _file([*tiers, _points("syncs", end, points)], end)
 
 
-def intervals_text(tiers: Mapping[str, Iterable[TextSpan]], end: float) -> str:
+def intervals_text(tiers: Mapping[str, Iterable[Span]], end: float) -> str:
     """Return a TextGrid with tiers of intervals, each in order and without overlaps.
 
     Args:
@@ -64,7 +52,7 @@ def _file(tiers: Sequence[Iterable[str]], end: float) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _intervals(name: str, end: float, spans: Iterable[TextSpan]) -> list[str]:
+def _intervals(name: str, end: float, spans: Iterable[Span]) -> list[str]:
     """Return an interval tier, in which silence is an interval without text."""
     rows = [
         (f"xmin = {_number(span.start)}", f"xmax = {_number(span.end)}", f"text = {_quoted(span.text)}")
@@ -73,7 +61,7 @@ def _intervals(name: str, end: float, spans: Iterable[TextSpan]) -> list[str]:
     return _tier("IntervalTier", name, end, "intervals", rows)
 
 
-def _filled(end: float, spans: Iterable[TextSpan]) -> Iterator[Span]:
+def _filled(end: float, spans: Iterable[Span]) -> Iterator[Span]:
     now = 0.0
     for span in spans:
         start, last = round(max(span.start, now), DIGITS), round(span.end, DIGITS)
