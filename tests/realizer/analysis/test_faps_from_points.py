@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import (
     bridge,
     facial_features,
@@ -18,6 +17,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.tables import faps
+from tests.mesh_features import points_of
 
 
 def test_facial_features_are_15_in_the_units_of_their_faps() -> None:

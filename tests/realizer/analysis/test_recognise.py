@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_mesh import points_of
 from realizer.analysis.faps_from_points import faps_from_points
 from realizer.analysis.recognise import Recogniser, emotion_of, recogniser
 from realizer.animation.axis import au_row
@@ -17,7 +16,7 @@ from realizer.emotions.words import emotion, known_words
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.tables.emotions import emotion_model, ring
-from tests.mesh_features import features_from_mesh, measurable_profile
+from tests.mesh_features import features_from_mesh, measurable_profile, points_of
 
 DRAWS = 60
 

@@ -12,12 +12,12 @@ from click.testing import CliRunner, Result
 from PIL import Image
 
 from realizer import realize
-from realizer.analysis.faps_from_mesh import points_of
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
+from tests.mesh_features import points_of
 from tests.painted import acted as moved
 from tests.painted import plain, truth
 from tests.portraits import LITERT, faps_of, portrait

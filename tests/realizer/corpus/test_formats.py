@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from realizer import realize
-from realizer.analysis.faps_from_mesh import points_of
 from realizer.corpus.formats import merged, read_part, write_annotations
 from realizer.corpus.recording import Annotation, CorpusError, Recording
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.tables import by_number, faps
 from realizer.tables.arkit_names import shapes
+from tests.mesh_features import points_of
 
 LABELS = (
     Annotation(0.0, 1.0, "surprise", "eva"),

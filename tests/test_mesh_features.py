@@ -1,22 +1,23 @@
-"""Tests of `realizer.analysis.faps_from_mesh`."""
+"""Tests of `tests.mesh_features`."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_mesh import (
-    faps_from_face,
-    faps_from_mesh,
-    points_of,
-)
 from realizer.analysis.faps_from_points import facial_features
 from realizer.analysis.recognise import recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from tests.mesh_features import features_from_mesh, measurable_profile
+from tests.mesh_features import (
+    faps_from_face,
+    faps_from_mesh,
+    features_from_mesh,
+    measurable_profile,
+    points_of,
+)
 
 SEEDS = (0, 1, 2)
 
