@@ -1,9 +1,11 @@
-"""Merging of surface pieces into one mesh with ARKit's shape names."""
+"""Merging of surface pieces into one mesh with ARKit's shape names, and what their names say of parts."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,8 @@ from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import components, half_edges
 from realizer.facebuild.arkit.materials import Material
-from realizer.facebuild.arkit.part_names import part_of
 from realizer.facebuild.arkit.scene import Piece
+from realizer.tables import csv_rows
 from realizer.tables.arkit_names import canonical
 
 LARGEST = 1e6  # of the size of all; int64 holds the places in steps of `SAME`
@@ -141,6 +143,31 @@ def _welded(surface: Surface) -> Surface:
     # Vertices without a triangle are invisible.
     taken = surface._taken(first, corners, surface.uv[whole], surface.material[whole])
     return replace(taken, colours=colours).subset(np.unique(corners))
+
+
+@dataclass(frozen=True)
+class _Rule:
+    part: str
+    pattern: str
+
+
+@cache
+def _rules() -> tuple[_Rule, ...]:
+    return csv_rows("parts.csv", _Rule, __package__)
+
+
+def part_of(names: tuple[str, ...]) -> str:
+    """Return the part that the names of a material, a mesh and a node suggest, or "".
+
+    A name that says skin is a last resort: whole heads are called so, with all that is in them.
+    """
+    weak = ""
+    for name in names:
+        rule = next((rule for rule in _rules() if re.search(rule.pattern, name.lower())), None)
+        if rule is not None and rule.part != "skin":
+            return rule.part
+        weak = weak or (rule.part if rule is not None else "")
+    return weak
 
 
 def cut(surface: Surface, height: Float64) -> Surface:

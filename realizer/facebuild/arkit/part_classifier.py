@@ -10,8 +10,7 @@ import numpy as np
 from realizer.core.array_types import Bool, Float64
 from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
-from realizer.facebuild.arkit.mesh_merge import Surface
-from realizer.facebuild.arkit.part_names import part_of
+from realizer.facebuild.arkit.mesh_merge import Surface, part_of
 
 ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
 BALL = (0.006, 0.022)  # m, radii of eyeballs

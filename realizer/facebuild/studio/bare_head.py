@@ -16,10 +16,9 @@ from realizer.facebuild.arkit.atlas import make_atlas
 from realizer.facebuild.arkit.gltf import Gltf
 from realizer.facebuild.arkit.head import Head, Report
 from realizer.facebuild.arkit.importer import describe_head, write_surface
-from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
+from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces, part_of
 from realizer.facebuild.arkit.orientation import EYE_DISTANCES, UNITS, USUAL_EYE_DISTANCE
 from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ROUND, sort_parts
-from realizer.facebuild.arkit.part_names import part_of
 from realizer.facebuild.arkit.points import points_of
 from realizer.facebuild.arkit.scene import read_pieces
 from realizer.facebuild.mpeg4.build import apply_zones

@@ -7,7 +7,7 @@ import pytest
 
 from realizer.core.errors import FaceError
 from realizer.facebuild.arkit.materials import Material
-from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
+from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces, part_of
 from realizer.facebuild.arkit.scene import Piece
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
@@ -98,3 +98,19 @@ def test_painted_colours_are_those_of_vertices_and_materials() -> None:
 def area(surface: Surface) -> float:
     a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+
+
+@pytest.mark.parametrize(
+    ("names", "part"),
+    [
+        (("Teeth_Lower", "", ""), "teeth"),
+        (("", "Hair", ""), "hair"),
+        (("Skin", "Tongue", ""), "tongue"),
+        (("Skin", "", "Head"), "skin"),
+        (("", "Object_1", ""), ""),
+        (("Glasses", "", ""), "other"),
+        (("Glasses_Lens", "", ""), "glass"),
+    ],
+)
+def test_part_of_reads_material_mesh_and_node(names: tuple[str, str, str], part: str) -> None:
+    assert part_of(names) == part
