@@ -1,4 +1,4 @@
-"""A writer of GLB files from a glTF 2.0 document and arrays, and their division into both."""
+"""A writer of GLB files from a glTF 2.0 document and arrays, their division into both, and quaternions."""
 
 import json
 import struct
@@ -168,3 +168,19 @@ def _shape(raw: Any) -> dict[str, Any]:
         "count": len(raw),
         "type": KINDS[raw.size // len(raw)],
     }
+
+
+def quaternions(turns: Float32) -> Float32:
+    """Convert pitch, yaw, roll (n, 3) to x, y, z, w (n, 4), as `face.deform` does: roll first, yaw last."""
+    from scipy.spatial.transform import Rotation
+
+    rotations = Rotation.from_euler("YXZ", turns[:, [1, 0, 2]].astype(np.float64)).as_quat()
+    out: Float32 = np.where(rotations[:, 3:] < 0, -rotations, rotations).astype(np.float32)
+    return out
+
+
+def half_turns(turns: Float32) -> Float32:
+    """Return quaternions (n, 4), w >= 0, of half the angles: neck and head turn by half each."""
+    out: Float32 = turns + np.array([0, 0, 0, 1], np.float32)
+    out /= np.linalg.norm(out, axis=-1, keepdims=True)
+    return out

@@ -21,7 +21,7 @@ OUTPUTS: Registry[Output] = Registry(
         ".webp": "realizer.outputs.webp:WEBP",
         ".glb": "realizer.outputs.glb:GLB",
         ".vrma": "realizer.outputs.vrma:VRMA",
-        ".arkit.csv": "realizer.outputs.arkit_csv:ARKIT_CSV",
+        ".arkit.csv": "realizer.outputs.csv_table:ARKIT_CSV",
         ".talkinghead.json": "realizer.outputs.talkinghead:TALKINGHEAD",
         ".rhubarb.json": "realizer.outputs.rhubarb:RHUBARB",
     },

@@ -9,9 +9,8 @@ import numpy as np
 from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.animation.axis import AU_NAMES, au
 from realizer.core.array_types import Float32, Float64
-from realizer.face.glb_file import GlbFile
+from realizer.face.glb_file import GlbFile, quaternions
 from realizer.outputs.output import Output
-from realizer.outputs.rotations import quaternions
 from realizer.realization import Realization
 from realizer.tables import toml_table
 from realizer.tables.lexemes import face_lexemes

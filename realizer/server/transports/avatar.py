@@ -11,8 +11,8 @@ import numpy as np
 
 from realizer.animation.arkit import ARKIT_NAMES
 from realizer.core.settings import Settings
-from realizer.outputs.arkit_csv import SHAPES
-from realizer.outputs.rotations import half_turns, quaternions
+from realizer.face.glb_file import half_turns, quaternions
+from realizer.outputs.csv_table import SHAPES
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.reconnecting import ReconnectingTransport

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.face.glb_file import GlbFile, read_glb
+from realizer.face.glb_file import GlbFile, half_turns, quaternions, read_glb
 from realizer.facebuild.arkit.gltf import Gltf
 
 ARRAYS = {
@@ -55,3 +55,18 @@ def test_glb_file_adds_to_a_file_that_was_read(tmp_path):
     assert found.json["extras"] == 7
     np.testing.assert_array_equal(found.accessor(0).squeeze(), ARRAYS["shorts"])
     np.testing.assert_array_equal(found.accessor(1), ARRAYS["floats"])
+
+
+TURNS = np.array([[0.3, -0.5, 0.1], [0, 1.2, 0], [0, 0, 0]], np.float32)
+
+
+def test_quaternions_turn_up_by_positive_pitch_about_x():
+    np.testing.assert_allclose(
+        quaternions(np.float32([[np.pi / 2, 0, 0]])), [[0.5**0.5, 0, 0, 0.5**0.5]], atol=1e-6
+    )
+
+
+def test_half_turns_make_whole_turns_twice():
+    half = half_turns(quaternions(TURNS)).astype(float)
+    twice = np.concatenate([2 * half[:, 3:] * half[:, :3], 2 * half[:, 3:] ** 2 - 1], axis=1)
+    np.testing.assert_allclose(twice, quaternions(TURNS), atol=1e-6)
