@@ -16,9 +16,8 @@ from realizer.cli.progress import bar, note
 if TYPE_CHECKING:
     from realizer.core.array_types import Float64
     from realizer.face.model import Fapu
-    from realizer.tracking.follower import Person
+    from realizer.tracking.follower import Person, Unfinished
     from realizer.tracking.markers.film import Look
-    from realizer.tracking.unfinished import Unfinished
 
 # The text of OUT, its rate, its FAPs, which of them were seen, and in which frames (None: in all).
 Tracked: TypeAlias = "tuple[str, float, Any, Any, Any]"
@@ -127,9 +126,9 @@ def _from_pictures(
 ) -> Tracked:
     """Return what the face in pictures does, or what painted markers on it do."""
     from realizer.tracking.files import FORMATS, by_mapping, mask
+    from realizer.tracking.follower import Unfinished
     from realizer.tracking.network import TrackingError
     from realizer.tracking.recording import rate_of, record
-    from realizer.tracking.unfinished import Unfinished
 
     with inputs.reporting(TrackingError):
         number = int(neutral) if neutral is not None and neutral.isdecimal() else None
