@@ -19,7 +19,7 @@ from realizer.face.basis import (
     couple_lips,
 )
 from realizer.face.model import Face
-from realizer.face.mouth_room import lip_room, tongue_room
+from realizer.face.mouth_room import rooms
 
 # Columns of poses.
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)
@@ -51,7 +51,6 @@ def deform(face: Face, poses: Any) -> Float32:
     if not np.isfinite(rows).all():
         raise ValueError("poses: wanted finite values, got NaN or infinity")
     basis, units = face.basis, moves_of(face)
-    rooms = [room for room in (lip_room(face), tongue_room(face)) if room is not None]
     rows, unit_values = rows[:, :FAPS], rows[:, FAPS:]
     moved: Bool = np.asarray(rows[:, LIDS.start : THRUST.stop].any(axis=1))
     if units is not None:
@@ -75,7 +74,7 @@ def deform(face: Face, poses: Any) -> Float32:
         here.reshape(len(here), -1)[:, 3 * first : 3 * last] += moves.T
         if units is not None:
             units(shown[part], lips[part], mixing[part], here)
-        for room in rooms:
+        for room in rooms(face):
             room(here)
         _turn_eyes(basis, rows[part], here)
         _keep_lids_over_balls(basis, rows[part], moved[part], here)

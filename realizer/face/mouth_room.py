@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.core.array_types import Float32, Float64, Index
+from realizer.core.array_types import Float32, Index
 from realizer.face.mesh_geometry import part_triangles, vertex_normals
 from realizer.face.model import Face
 
@@ -150,13 +150,6 @@ class TongueRoom:
         return (start + share * step).reshape(2, 3, *turn.shape)
 
 
-@lru_cache(maxsize=8)
-def tongue_room(face: Face) -> TongueRoom | None:
-    """Return the room of a face's tongue, or None if the face lacks tongue or teeth."""
-    parts = ("tongue", "upper_teeth", "lower_teeth")
-    return TongueRoom(face) if all(part in face.parts for part in parts) else None
-
-
 def _along(line: Float32, x: Any) -> tuple[Any, Any]:
     """Return y and z (n, m) of polylines (n, k, 3), whose x ascends, at x (n, m)."""
     y, z = line[:, :1, 1], line[:, :1, 2]
@@ -179,22 +172,13 @@ SQUEEZE = 0.0004  # m; lining is squeezed before it touches: what lay farther ou
 
 
 class LipRoom:
-    """Moves the lining of a face's lips and cheeks out of its teeth."""
+    """Moves the lining of lips and cheeks out of a row of teeth.
 
-    def __init__(self, face: Face) -> None:
-        self._rows = [_Row(face, face.vertices.astype(np.float64), name) for name in ROWS]
+    How far the teeth reach outwards is known by direction and height.
+    """
 
-    def __call__(self, out: Float32) -> None:
-        """Move the lining of deformed faces (n, n_vertices, 3), whose heads are not turned, in place."""
-        for row in self._rows:
-            row(out)
-
-
-class _Row:
-    """A row of teeth: how far it reaches outwards, by direction and height, and the lining before it."""
-
-    def __init__(self, face: Face, at: Float64, name: str) -> None:
-        first, last = face.parts[name]
+    def __init__(self, face: Face, name: str) -> None:
+        at, (first, last) = face.vertices.astype(np.float64), face.parts[name]
         mine = at[first:last]
         self._back = float(mine[np.abs(mine[:, 0]).argmax(), 2])
         self._frame = first + np.array([mine[:, 2].argmax(), mine[:, 2].argmin()], np.int32)
@@ -227,7 +211,7 @@ class _Row:
         self._loose = _squeezed(need - around).astype(np.float32)
 
     def __call__(self, out: Float32) -> None:
-        """Move the lining of deformed faces (n, n_vertices, 3) outwards, in place."""
+        """Move the lining of deformed faces (n, n_vertices, 3) out, before their heads turn, in place."""
         lining, frame = out[:, self._lining], out[:, self._frame]
         if np.abs(lining - self._home).max(initial=0) < 1e-6:
             return
@@ -267,6 +251,9 @@ def _squeezed(inside: Any) -> Any:
 
 
 @lru_cache(maxsize=8)
-def lip_room(face: Face) -> LipRoom | None:
-    """Return the room of a face's lips, or None if the face lacks teeth."""
-    return LipRoom(face) if set(ROWS) <= set(face.parts) else None
+def rooms(face: Face) -> tuple[LipRoom | TongueRoom, ...]:
+    """Return the rooms of a face's lips and tongue; none of what the face lacks, or if it lacks teeth."""
+    if not set(ROWS) <= set(face.parts):
+        return ()
+    lips = tuple(LipRoom(face, name) for name in ROWS)
+    return (*lips, TongueRoom(face)) if "tongue" in face.parts else lips
