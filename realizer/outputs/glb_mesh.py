@@ -15,8 +15,7 @@ from realizer.face.maps import Maps
 from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer.outputs.morph_targets import MorphTargets
-from realizer.render.normal_map import normals_of
-from realizer.render.textures import ALPHA, OCCLUSION, ROUGHNESS, SLOPE_U, SLOPE_V, texels_of
+from realizer.render.textures import ALPHA, OCCLUSION, ROUGHNESS, SLOPE_U, SLOPE_V, normals_of, texels_of
 
 QUALITY = {"colour": 92, "normal": 95, "surface": 90}  # of JPEG
 MARGIN = 4  # texels

@@ -14,8 +14,7 @@ from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals
 from realizer.outputs.glb_mesh import tangents
 from realizer.render.folds import Folds
-from realizer.render.normal_map import normal_map
-from realizer.render.textures import FULL
+from realizer.render.textures import FULL, normal_map
 
 WEBP = "EXT_texture_webp"
 MIPMAPS, LINEAR, CLAMP = 9987, 9729, 33071  # of samplers

@@ -1,6 +1,7 @@
 """`texels_of`: maps decoded, with slopes for heights, in levels."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,12 +14,15 @@ from realizer.render.textures import (
     FOLD,
     FOLD_U,
     FOLD_V,
+    LARGEST,
     LEVEL,
     OCCLUSION,
     SLOPE_U,
     SLOPE_V,
     STEEPEST,
     THICKNESS,
+    normal_map,
+    slopes_in,
     texels_of,
 )  # fmt: skip
 
@@ -85,3 +89,33 @@ def test_texels_of_maps_are_no_larger_than_asked_for():
 def test_texels_of_a_broken_map_names_it():
     with pytest.raises(FaceError, match=r"albedo\.webp: wanted a picture"):
         texels_of(Maps({"albedo": b"no"}, None, 0.0, 1.0, None, None))
+
+
+def bumpy(**pictures):
+    """Maps whose relief is 5 cm high in steps, and whose texels are a fifth of a millimetre wide."""
+    return replace(maps(**pictures), relief=0.05, texel=0.0002)
+
+
+HILLS = 128 + 60 * np.sin(np.arange(32) / 3) * np.cos(np.arange(32)[:, None] / 4)
+
+
+def test_normal_map_has_the_slopes_of_the_relief():
+    found = bumpy(relief=HILLS)
+    back = slopes_in(Maps({"normal": normal_map(found)}, None, 0.0, 1.0, None, None), "normal")
+    assert back.astype(int) == pytest.approx(slopes_in(found, "relief").astype(int), abs=2)
+    assert np.ptp(back) > 10
+
+
+def test_normal_map_of_a_large_relief_is_half_as_large():
+    ramp = np.tile(np.arange(2 * LARGEST) // 16, (8, 1))
+    with Image.open(io.BytesIO(normal_map(bumpy(relief=ramp)))) as picture:
+        assert picture.size == (LARGEST, 4)
+
+
+def test_normal_map_of_a_face_that_has_one_is_that_one():
+    found = bumpy(normal=np.full((4, 4, 3), 128))
+    assert normal_map(found) == found.files["normal"]
+
+
+def test_normal_map_of_level_skin_is_none():
+    assert normal_map(bumpy(albedo=np.zeros((4, 4, 3)))) is None
