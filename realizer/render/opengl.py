@@ -15,6 +15,7 @@ from realizer.face.drawn_mesh import DrawnMesh
 from realizer.render.cameras import Camera
 from realizer.render.canvas import Canvas
 from realizer.render.lamp_view import SIDE
+from realizer.render.surfaces import mirrored_of, uniforms_of
 from realizer.render.textures import (
     ALPHA,
     FOLD,
@@ -27,7 +28,6 @@ from realizer.render.textures import (
     THICKNESS,
     Texels,
 )
-from realizer.render.uniforms import mirrored_of, uniforms_of
 
 NO_LIBRARY = "pictures by OpenGL need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures by OpenGL need OpenGL 4.0: install Debian packages libegl1 and libgl1"

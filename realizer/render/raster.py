@@ -15,9 +15,8 @@ from realizer.render.lamp_view import SIDE, LampView
 from realizer.render.light import Light, unit
 from realizer.render.lighting import light_band
 from realizer.render.shading import tone_curve
-from realizer.render.surfaces import surfaces
+from realizer.render.surfaces import mirrored_of, surfaces
 from realizer.render.textures import CHANNELS, Texels
-from realizer.render.uniforms import mirrored_of
 from realizer.render.visibility import SAMPLES, fill
 
 MAX_THREADS = 4

@@ -1,7 +1,7 @@
 // How light leaves a surface: the formula of shading.py and shadows.py for graphics cards.
 //
 // It is a part of fragment shaders, in GLSL 3.30 and in GLSL ES 3.00 (which wants "precision highp float;" and
-// "precision highp sampler2DArray;" before it). realizer/render/uniforms.py gives the uniforms; colours are
+// "precision highp sampler2DArray;" before it). realizer/render/surfaces.py gives the uniforms; colours are
 // linear light. Directions: +x the character's left, +y up, +z forward; places are in metres.
 
 uniform sampler2D albedoMap;   // sRGB and alpha, unconverted

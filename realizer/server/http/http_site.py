@@ -234,7 +234,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
     from realizer.render.cameras import camera_for
     from realizer.render.lamp_view import LampView
     from realizer.render.light import HEIGHT, preset, presets
-    from realizer.render.uniforms import uniforms_of
+    from realizer.render.surfaces import uniforms_of
 
     face = load_face(name)
     lights = {}
@@ -261,7 +261,7 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
 def _mirror(light: str) -> bytes:
     """Return the texels of `mirrorMap` of surface.glsl: half floats, red, green, blue and 1."""
     from realizer.render.light import preset, presets
-    from realizer.render.uniforms import mirrored_of
+    from realizer.render.surfaces import mirrored_of
 
     if light not in presets():
         raise UnknownName(f"light: wanted one of {', '.join(presets())}, got {light[:80]!r}")
