@@ -16,18 +16,7 @@ from realizer.render.cameras import Camera
 from realizer.render.canvas import Canvas
 from realizer.render.lamp_view import SIDE
 from realizer.render.surfaces import mirrored_of, uniforms_of
-from realizer.render.textures import (
-    ALPHA,
-    FOLD,
-    FOLD_U,
-    FOLD_V,
-    OCCLUSION,
-    RED,
-    SLOPE_U,
-    SLOPE_V,
-    THICKNESS,
-    Texels,
-)
+from realizer.render.textures import TEXTURES, Texels
 
 NO_LIBRARY = "pictures by OpenGL need the render extra: pip install 'bml-realizer[render]'"
 NO_GL = "pictures by OpenGL need OpenGL 4.0: install Debian packages libegl1 and libgl1"
@@ -36,13 +25,6 @@ DEVICES = 8  # tried at most
 EGL: Any = {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
 SAMPLES = 4  # of a pixel
 DEPTH_CLAMP = 0x864F  # a constant of OpenGL: what lies outside the lamp's box casts shadows too
-# Channels of Texels in each texture of surface.glsl.
-TEXTURES = {
-    "albedoMap": tuple(range(RED, ALPHA + 1)),
-    "slopeMap": (SLOPE_U, SLOPE_V, FOLD_U, FOLD_V),
-    "surfaceMap": tuple(range(OCCLUSION, THICKNESS + 1)),
-    "foldMap": (FOLD,),
-}
 MOVING, FIXED = ("place", "normal", "fold", "strand"), ("uv", "colour", "occlusionRough", "kind")
 
 VERTEX = """#version 400 core

@@ -15,6 +15,13 @@ from realizer.face.maps import Maps
 # and how deep they are: 255 is half of `Maps.relief` below the skin.
 RED, GREEN, BLUE, ALPHA, SLOPE_U, SLOPE_V, OCCLUSION, ROUGHNESS, THICKNESS, FOLD_U, FOLD_V, FOLD = range(12)
 CHANNELS = 12  # a texel begins at a multiple of four bytes
+# Channels in each texture of surface.glsl.
+TEXTURES = {
+    "albedoMap": tuple(range(RED, ALPHA + 1)),
+    "slopeMap": (SLOPE_U, SLOPE_V, FOLD_U, FOLD_V),
+    "surfaceMap": tuple(range(OCCLUSION, THICKNESS + 1)),
+    "foldMap": (FOLD,),
+}
 LEVEL = np.array([255, 255, 255, 255, 128, 128, 255, 255, 255, 128, 128, 0], np.uint8)
 STEEPEST = 1.0  # slope at byte 255, metres per metre; 128 is level
 FOLD_SHADE = 0.65  # share of the light that a fold hides whose depth is 255
