@@ -1,6 +1,6 @@
 """Emotion profiles from statistics or observations of FAPs (Raouzaiou et al. 2002, 3.3)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -38,12 +38,11 @@ def from_statistics(
     return Profile(name, source, ranges)
 
 
-def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Profile:
+def from_faces(name: str, frames: Any) -> Profile:
     """Return the profile of observed faces that show the same expression.
 
     Args:
         frames: (n, 68) FAP values of at least 2 faces; column = FAP - 1.
-        faps: FAPs of the expression; None: those whose mean is at least `MIN_MEAN`.
 
     Raises:
         ValueError: frames of another shape, or values that are not finite.
@@ -54,6 +53,6 @@ def from_faces(name: str, frames: Any, faps: Iterable[int] | None = None) -> Pro
     if not np.isfinite(values).all():
         raise ValueError(f"{name}: wanted finite values, got NaN or infinity")
     means, deviations = values.mean(axis=0), values.std(axis=0, ddof=1)
-    chosen = faps if faps is not None else (int(k) + 1 for k in np.flatnonzero(np.abs(means) >= MIN_MEAN))
+    chosen = (int(k) + 1 for k in np.flatnonzero(np.abs(means) >= MIN_MEAN))
     measured = {fap: (float(means[fap - 1]), float(deviations[fap - 1])) for fap in chosen if fap >= 3}
     return from_statistics(name, measured, "faces")

@@ -189,18 +189,8 @@ def films(answers: Sequence[Answer]) -> Table:
             counts = [sum(one.role == role for one in some) for role in (*pair, "same")]
             p = against_chance(np.array(counts[:2], np.float64))[1]
             rows.append((*group[:2], *pair, *counts, *found, p))
-    columns = (
-        "who",
-        "variant",
-        "one",
-        "other",
-        "one preferred",
-        "other preferred",
-        "same",
-        "share",
-        *ENDS,
-        "p",
-    )
+    sides = "one", "other", "one preferred", "other preferred", "same"
+    columns = "who", "variant", *sides, "share", *ENDS, "p"
     return Table("films", "Pairs of films, and the share that prefers the first", columns, tuple(rows))
 
 

@@ -15,6 +15,7 @@ from realizer.facebuild.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer.facebuild.arkit.orientation import oriented, pose_of
 from realizer.facebuild.arkit.part_classifier import ASIDE, FLOOR, ball_behind, sort_parts
 from realizer.facebuild.arkit.scene import read_pieces
+from realizer.facebuild.mpeg4.parameters import ranges
 from realizer.tables import csv_rows, faps
 from realizer.tables.arkit_names import canonical, nearest, shapes
 
@@ -78,22 +79,11 @@ def source_table(sources: Collection[FapSource]) -> tuple[str, ...]:
     """Return the sources as lines of a table, FAPs of the same source together."""
     order = sorted(sources, key=lambda one: ((SURE, FAIR, GUESS).index(one.sure), one.made_by, one.fap))
     cells = [("FAPs", "move by", "how sure")] + [
-        (_ranges([one.fap for one in group]), made_by, sure)
+        (", ".join(ranges(np.array([one.fap for one in group])).split()), made_by, sure)
         for (sure, made_by), group in groupby(order, lambda one: (one.sure, one.made_by))
     ]
     wide = [max(len(row[k]) for row in cells) for k in range(2)]
     return tuple(f"{a:<{wide[0]}}  {b:<{wide[1]}}  {c}" for a, b, c in cells)
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Return ascending numbers in words such as 3, 5-7."""
-    runs: list[list[int]] = []
-    for number in numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
-    return ", ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from realizer.facebuild.arkit.mesh_merge import Surface
 from realizer.facebuild.arkit.mouth import drag_of, joint_of, mouth_of
 from realizer.facebuild.arkit.part_classifier import ball_behind
 from realizer.facebuild.arkit.points import points_of
-from realizer.facebuild.au.measure import UnitMeasurement, write_shapes
+from realizer.facebuild.au.measure import OPEN, UnitMeasurement, write_shapes
 from realizer.facebuild.face_files import write_fields, write_head, write_mesh
 from realizer.facebuild.mpeg4.build import apply_zones, with_brows
 from realizer.facebuild.mpeg4.defaults import default_setup, split_sides
@@ -251,9 +251,6 @@ def _gaze_rows(surface: Surface, ranges: dict[str, tuple[int, int]]) -> dict[int
             angle = float(np.arcsin(np.clip(size / max(radius, 1e-6), 0.1, 0.9)))
             rows[fap] = move / angle
     return rows
-
-
-OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
 
 
 def measure_units(face: Face, surface: Surface) -> dict[int, UnitMeasurement]:

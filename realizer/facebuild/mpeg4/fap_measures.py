@@ -11,6 +11,7 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64
 from realizer.core.units import ANGLE_UNIT
+from realizer.face.au.regions import LOWER, UPPER
 from realizer.face.deform import deform
 from realizer.face.mesh_geometry import (
     half_edges,
@@ -24,8 +25,6 @@ from realizer.facebuild.eyeball import PUPIL
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.tables import Fap
 
-UPPER = ("2.2", "2.6", "2.7", "8.1", "8.5", "8.6")
-LOWER = ("2.3", "2.8", "2.9", "8.2", "8.7", "8.8")
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
 LIDS = {"3.1": "3.3", "3.3": "3.1", "3.2": "3.4", "3.4": "3.2"}
 TONGUE = {43, 44, 45, 46, 47}

@@ -68,7 +68,7 @@ def setup_table(setup: Setup) -> dict[str, Any]:
         "whole": sorted(setup.whole),
         "points": {name: list(place) for name, place in setup.points.items()},
         "zone": [asdict(setup.zones[fap]) for fap in sorted(setup.zones)],
-        "masks": {str(fap): _ranges(mask) for fap, mask in sorted(setup.masks.items())},
+        "masks": {str(fap): ranges(mask) for fap, mask in sorted(setup.masks.items())},
     }
 
 
@@ -90,7 +90,7 @@ def write_setup(path: Path, setup: Setup) -> None:
         lines += ["", "[masks]  # FAPs that share it = vertices"]
         shared: dict[str, list[int]] = {}
         for fap in sorted(setup.masks):
-            shared.setdefault(_ranges(setup.masks[fap]), []).append(fap)
+            shared.setdefault(ranges(setup.masks[fap]), []).append(fap)
         lines += [f'"{" ".join(map(str, group))}" = "{ranges}"' for ranges, group in shared.items()]
     path.write_text("\n".join(lines) + "\n", "utf-8")
 
@@ -166,7 +166,8 @@ def _expanded(where: str, ranges: Any) -> Int32:
     return np.flatnonzero(mask).astype(np.int32)
 
 
-def _ranges(mask: Int32) -> str:
+def ranges(mask: Int32) -> str:
+    """Return ascending numbers as ranges: 3, 4, 5, 9 are `"3-5 9"`."""
     cuts = np.flatnonzero(np.diff(mask) != 1) + 1
     runs = [run for run in np.split(mask, cuts) if len(run)]
     return " ".join(str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}" for run in runs)

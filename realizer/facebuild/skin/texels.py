@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Index, Int32
+from realizer.face.mesh_geometry import flat_cross, triangle_normals
 
 PAD = 8  # texels around an island that repeat its edge
 COARSE = 4  # texels between the samples of what changes slowly
@@ -142,7 +143,7 @@ def _covered(corners: Float64, size: int) -> tuple[Index, Int32, Float32]:
     high = np.floor(corners.max(axis=1)).clip(0, size - 1).astype(int) + 1
     a, b, c = np.moveaxis(corners, 1, 0)
     p, q = b - a, c - a
-    turn = p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]
+    turn = flat_cross(p, q)
     for k in np.flatnonzero(np.abs(turn) > 1e-9):
         y, x = np.mgrid[low[k, 1] : high[k, 1], low[k, 0] : high[k, 0]]
         dx, dy = x - a[k, 0], y - a[k, 1]
@@ -163,10 +164,9 @@ def _covered(corners: Float64, size: int) -> tuple[Index, Int32, Float32]:
 
 def _widths(vertices: Float64, triangles: Int32, corners: Float64) -> Float64:
     """Return how many metres a texel is wide about each vertex, (n,)."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    area = np.linalg.norm(triangle_normals(vertices, triangles), axis=1)
     p, q = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    flat = np.abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+    flat = np.abs(flat_cross(p, q))
     total, texels = np.zeros(len(vertices)), np.zeros(len(vertices))
     for k in range(3):
         np.add.at(total, triangles[:, k], area)

@@ -11,6 +11,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Index
 from realizer.core.errors import TableError
 from realizer.face.features import NAMES
+from realizer.face.mesh_geometry import flat_cross
 from realizer.tables import csv_rows, read_csv
 from realizer.tracking.network import TrackingError
 
@@ -155,8 +156,7 @@ def _layout(rows: Sequence[Row], where: str) -> Layout:
 def _turn(places: Float64, rows: Index) -> Float64:
     """Return twice the areas (n,) of triangles, positive if counterclockwise."""
     a, b, c = places[rows[:, 0]], places[rows[:, 1]], places[rows[:, 2]]
-    first, second = b - a, c - a
-    return np.asarray(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
+    return flat_cross(b - a, c - a)
 
 
 def _heights(places: Float64, rows: Index) -> Float64:
