@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -151,9 +151,7 @@ class _Rule:
     pattern: str
 
 
-@cache
-def _rules() -> tuple[_Rule, ...]:
-    return csv_rows("parts.csv", _Rule, __package__)
+_rules = cache(partial(csv_rows, "parts.csv", _Rule, __package__))
 
 
 def part_of(names: tuple[str, ...]) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal
 
 import numpy as np
@@ -38,9 +38,7 @@ class _Default:
     about: str
 
 
-@cache
-def _table() -> tuple[_Default, ...]:
-    return csv_rows("zones.csv", _Default, __package__)
+_table = cache(partial(csv_rows, "zones.csv", _Default, __package__))
 
 
 def default_setup(

@@ -8,7 +8,7 @@ at the other's feature point, every point moves exactly as its own FAP says, wha
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -32,10 +32,7 @@ class _Pair:
     other: int
 
 
-@cache
-def pairs() -> tuple[_Pair, ...]:
-    """Return the FAPs whose feature points are neighbours."""
-    return csv_rows("neighbours.csv", _Pair, __package__)
+pairs = cache(partial(csv_rows, "neighbours.csv", _Pair, __package__))  # FAPs with neighbouring points
 
 
 def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
