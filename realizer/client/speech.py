@@ -185,9 +185,11 @@ class Speech(OpenSpeech):
         self._closed = True
         if self.progress.fault is None:
             await self._flush(close=True)
+        self._end_pause()
 
     async def stop(self) -> None:
         self._unsent = ""
+        self._end_pause()
         await super().stop()
 
     async def until(self, sync: str) -> float:
@@ -207,6 +209,11 @@ class Speech(OpenSpeech):
                 await self._speech(append=text[at : at + LONGEST])
             if close:
                 await self._speech(close=True)
+
+    def _end_pause(self) -> None:
+        """Cancel the task that waits, when there is nothing left to send: it would outlive its event loop."""
+        if self._pausing is not None:
+            self._pausing.cancel()
 
     async def _pause(self) -> None:
         """Send appended text after a pause; if the connection ends, the methods that wait raise."""

@@ -54,6 +54,8 @@ def test_speech_sends_quick_tokens_together_and_a_stop_at_once() -> None:
         await speech.append("three")
         await speech.close()
         await speech.close()
+        await asyncio.sleep(0)
+        assert asyncio.all_tasks() == {asyncio.current_task()}, "none outlives the loop"
         with pytest.raises(ClientError, match="the speech s1 was closed"):
             await speech.append("four")
         assert sent[0][1]["language"] == "nl"
