@@ -144,7 +144,7 @@ def test_voice_reports_the_words_that_were_heard_before_a_stop() -> None:
     serving(test)
 
 
-def test_speech_and_voice_end_when_they_are_stopped_before_anything_was_sent() -> None:
+def test_speech_and_voice_end_when_stopped_before_anything_was_sent() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
             voice = client.voice(rate=RATE)
