@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -24,10 +24,8 @@ class FapExpression:
     emotion: str
 
 
-@cache
-def fap_expressions() -> tuple[FapExpression, ...]:
-    """Return all expressions but 0, which is none."""
-    return tables.csv_rows("fap_expressions.csv", FapExpression)
+# () -> all expressions but 0, which is none
+fap_expressions = cache(partial(tables.csv_rows, "fap_expressions.csv", FapExpression))
 
 
 def expand_compound(clip: FAPClip) -> FAPClip:

@@ -23,8 +23,7 @@ from realizer.render.contact_sheet import INK, PAPER, Cell, Group, sheet
 from realizer.render.difference_image import MAX_DIFFERENCE, difference, faint, flatten, ramp
 from realizer.render.light import preset
 from realizer.render.renderer import Renderer
-from realizer.tables import Fap, by_number, faps
-from realizer.tables.control_groups import au_regions, fap_regions
+from realizer.tables import Fap, by_number, faps, regions
 from realizer.tables.emotions import archetypes, ring
 from realizer.tables.lexemes import face_lexemes
 
@@ -71,7 +70,7 @@ def of_faps(value: float) -> list[Series]:
             f"FAPs: {region.name}",
             [pose for number in region.members for pose in _both_ways(rows[number], value)],
         )
-        for region in fap_regions()
+        for region in regions("fap")
     ]
 
 
@@ -104,7 +103,7 @@ def of_aus(intensity: float) -> list[Series]:
                 for unit in [by_number()[number]]
             ],
         )
-        for region in au_regions()
+        for region in regions("au")
     ]
 
 

@@ -3,7 +3,7 @@
 import logging
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -33,10 +33,8 @@ class ExpressionWords:
         return tuple(word.strip() for word in self.means.split(";") if word.strip())
 
 
-@cache
-def expression_words() -> Mapping[str, ExpressionWords]:
-    """Return name in the expression library -> words."""
-    return {row.name: row for row in tables.csv_rows("expression_words.csv", ExpressionWords)}
+# () -> {name in the expression library: words}
+expression_words = cache(partial(tables.csv_index, "expression_words.csv", ExpressionWords, "name"))
 
 
 class Library(Mapping[str, Expression]):

@@ -80,6 +80,11 @@ def csv_rows(name: str, row_class: type[Row], package: str = __name__) -> tuple[
     return read_csv(files(package).joinpath(name).read_text("utf-8"), row_class, name)
 
 
+def csv_index(name: str, row_class: type[Row], key: str) -> Mapping[Any, Row]:
+    """Return the cell of the column `key` -> row of a built-in CSV table; errors as for `read_csv`."""
+    return {getattr(row, key): row for row in csv_rows(name, row_class)}
+
+
 @cache
 def toml_table(name: str) -> dict[str, Any]:
     """Return a built-in TOML table; errors as for `read_toml`."""
@@ -193,6 +198,20 @@ au_combinations = cache(partial(csv_rows, "au_combinations.csv", AuCombination))
 def by_number() -> Mapping[int, ActionUnit]:
     """Return AU number -> action unit."""
     return {row.au: row for row in action_units()}
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A heading of user interfaces, and the numbers of its FAPs or AUs."""
+
+    name: str
+    members: tuple[int, ...]
+
+
+@cache
+def regions(kind: Literal["fap", "au"]) -> tuple[Region, ...]:
+    """Return the groups of the low-level FAPs, 3..68, or the classes of the AUs, from the brows down."""
+    return tuple(Region(row["name"], tuple(row["members"])) for row in toml_table("regions.toml")[kind])
 
 
 def nearest(number: int) -> str:

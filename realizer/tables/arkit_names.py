@@ -2,11 +2,11 @@
 
 import re
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 from realizer.core.similar import similar
-from realizer.tables import csv_rows
+from realizer.tables import csv_index
 
 SIDES = {"left": "Left", "l": "Left", "right": "Right", "r": "Right"}
 MIN_LETTERS = 6  # of the end of a name; shorter ends are ambiguous
@@ -24,10 +24,7 @@ class Shape:
     without: str
 
 
-@cache
-def shapes() -> dict[str, Shape]:
-    """Return ARKit's 52 shapes by name."""
-    return {row.name: row for row in csv_rows("arkit.csv", Shape)}
+shapes = cache(partial(csv_index, "arkit.csv", Shape, "name"))  # () -> ARKit's 52 shapes by name
 
 
 @cache

@@ -50,16 +50,9 @@ class Place:
     between: str
 
 
-@cache
-def whissell_words() -> Mapping[str, WhissellWord]:
-    """Return lower-case word -> row."""
-    return {row.word: row for row in tables.csv_rows("words_whissell.csv", WhissellWord)}
-
-
-@cache
-def own_words() -> Mapping[str, OwnWord]:
-    """Return lower-case word -> row."""
-    return {row.word: row for row in tables.csv_rows("words_own.csv", OwnWord)}
+# () -> {lower-case word: row}
+whissell_words = cache(partial(tables.csv_index, "words_whissell.csv", WhissellWord, "word"))
+own_words = cache(partial(tables.csv_index, "words_own.csv", OwnWord, "word"))
 
 
 @cache

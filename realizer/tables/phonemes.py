@@ -1,8 +1,7 @@
 """The articulatory features of phonemes (`phonemes.csv`)."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Literal
 
 from realizer import tables
@@ -20,10 +19,8 @@ class PhonemeFeatures:
     rounded: float
 
 
-@cache
-def phoneme_features() -> Mapping[str, PhonemeFeatures]:
-    """Return IPA symbol -> features."""
-    return {row.ipa: row for row in tables.csv_rows("phonemes.csv", PhonemeFeatures)}
+# () -> {IPA symbol: features}
+phoneme_features = cache(partial(tables.csv_index, "phonemes.csv", PhonemeFeatures, "ipa"))
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -24,10 +24,8 @@ class OculusViseme:
     viseme: int
 
 
-@cache
-def oculus_visemes() -> tuple[OculusViseme, ...]:
-    """Return the 15 Oculus visemes in the order of their numbers."""
-    return tables.csv_rows("visemes_oculus.csv", OculusViseme)
+# () -> the 15 Oculus visemes in the order of their numbers
+oculus_visemes = cache(partial(tables.csv_rows, "visemes_oculus.csv", OculusViseme))
 
 
 def viseme_weights(phonemes: Sequence[Phoneme], times: Float64) -> Float64:

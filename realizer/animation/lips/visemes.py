@@ -74,10 +74,8 @@ class Articulation:
     shape: Mix  # the same for the shapes of `lip_shapes`; differs from `mix` if the sound has its own targets
 
 
-@cache
-def lip_shapes() -> tuple[LipShape, ...]:
-    """Return the 15 mouth shapes of visemes, index = viseme, then those of sounds that differ from them."""
-    return tables.csv_rows("visemes.csv", LipShape)
+# () -> the 15 mouth shapes of visemes, index = viseme, then those of sounds that differ from them
+lip_shapes = cache(partial(tables.csv_rows, "visemes.csv", LipShape))
 
 
 @cache

@@ -32,8 +32,7 @@ def vocabulary() -> bytes:
     from realizer.emotions.words import known_words
     from realizer.expressions.library import builtin
     from realizer.speech.registry import voices
-    from realizer.tables import action_units, faps
-    from realizer.tables.control_groups import au_regions, fap_regions
+    from realizer.tables import action_units, faps, regions
     from realizer.tables.emotions import ring
     from realizer.tables.lexemes import face_lexemes, head_lexemes
 
@@ -55,7 +54,7 @@ def vocabulary() -> bytes:
         "expression name": list(builtin()),
         "fap number": [str(fap["fap"]) for fap in movable],
     }
-    regions = {"aus": au_regions(), "faps": fap_regions()}
+    groups = {"aus": regions("au"), "faps": regions("fap")}
     profiles = {
         kind: [f"{name} {number}" for name, numbered in archetypes(kind).items() for number in numbered]
         for kind in ("published", "raw")
@@ -65,7 +64,7 @@ def vocabulary() -> bytes:
         "values": values,
         "aus": aus,
         "faps": movable,
-        "groups": {kind: [_fields(row, "name", "members") for row in rows] for kind, rows in regions.items()},
+        "groups": {kind: [_fields(row, "name", "members") for row in rows] for kind, rows in groups.items()},
         "wheel": [_fields(row, "name", "kind", "angle", "activation") for row in ring("paul").values()],
         "profiles": profiles,
         "voices": [_fields(voice, "name", "engine", "available") for voice in voices()],

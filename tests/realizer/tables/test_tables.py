@@ -241,6 +241,18 @@ def test_gaps_of_a_nod_and_a_blink_have_natural_lengths() -> None:
     assert sum(gap.preferred for gap in timing.gaps("faceLexeme", "BLINK").gaps) == pytest.approx(0.3)
 
 
+def test_regions_have_every_action_unit_and_low_level_fap_once() -> None:
+    aus = [au for region in tables.regions("au") for au in region.members]
+    faps = [fap for region in tables.regions("fap") for fap in region.members]
+    assert sorted(aus) == [row.au for row in tables.action_units()]
+    assert faps == list(range(3, 69))
+
+
+def test_regions_of_faps_are_the_groups_of_the_standard() -> None:
+    for region in tables.regions("fap"):
+        assert len({FAPS[fap].group for fap in region.members}) == 1
+
+
 def test_row_classes_are_frozen() -> None:
     row = tables.faps()[0]
     with pytest.raises(AttributeError):
