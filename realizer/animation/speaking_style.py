@@ -1,7 +1,5 @@
 """How what a face shows changes the way it speaks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import cache
 from typing import NamedTuple

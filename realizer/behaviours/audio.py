@@ -1,7 +1,5 @@
 """audiofile: plays a recording, which is a sound file of the media folder or a clip of a client."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

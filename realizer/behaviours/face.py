@@ -1,7 +1,5 @@
 """faceLexeme, faceFacs, face, faceShift, expression, blink: AU channels that rise, hold and relax."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TypeAlias
 

@@ -1,7 +1,5 @@
 """faps, fapFile: a pose or a file of facial animation parameters as channels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bml_schema import FapFile, Faps

@@ -1,7 +1,5 @@
 """Expansion of visemes and expressions (FAP 1 and 2) into the FAPs that show them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache, partial
 

@@ -1,7 +1,5 @@
 """gaze, gazeShift: the eyes turn first, the head follows, and the eyes turn back meanwhile."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

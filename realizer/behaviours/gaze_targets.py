@@ -1,7 +1,5 @@
 """Gaze targets: scenes, the angles to a target, and the AU channels of eyes and head."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """head, headDirectionShift: nods, shakes and tilts as strokes, and a new base direction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 

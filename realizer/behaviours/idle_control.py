@@ -1,7 +1,5 @@
 """idle: scales the blinks and small movements of a face, and chooses where its eyes look."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from bml_schema import Idle

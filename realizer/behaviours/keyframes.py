@@ -1,7 +1,5 @@
 """facekeyframe: BMLT's keyframes of FAPs or action units as channels; documents of FAP clips."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The interface of behaviours: timing and expansion of a node class, and the context of planning."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache

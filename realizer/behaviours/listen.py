@@ -1,7 +1,5 @@
 """listen, and the responses of a character that hears another one: nods, raised brows, smiles."""
 
-from __future__ import annotations
-
 import math
 import zlib
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """Access to files of the media folder; nothing outside it is ever opened."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections import OrderedDict

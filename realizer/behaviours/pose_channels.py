@@ -1,7 +1,5 @@
 """AU channels that rise to a pose and relax or stay, follow keys, or vary as those of people do."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache, lru_cache, partial

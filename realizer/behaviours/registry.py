@@ -1,7 +1,5 @@
 """The registry of behaviours: a row for each module with behaviour elements, and those of plug-ins."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

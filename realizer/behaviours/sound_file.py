@@ -1,7 +1,5 @@
 """A reader of sound files: WAV by our own code, other formats by PyAV."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import struct

@@ -1,7 +1,5 @@
 """speech: the request to a voice, the times of the utterance, and the lips."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary

@@ -4,8 +4,6 @@ gesture, pointing, posture, postureShift, locomotion; wait, a pause that other b
 interrupt, activate, parametervaluechange, which act on other blocks.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """timeline: a timeline file of the media folder as channels of action units and mixing orders."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Conflicts: cycles of relations between sync points that cannot hold together, and their words."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

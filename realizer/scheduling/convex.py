@@ -1,7 +1,5 @@
 """An active-set solver for convex problems of differences; it returns a cycle if there is no solution."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

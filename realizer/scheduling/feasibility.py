@@ -1,7 +1,5 @@
 """All conflicts of a large problem in one pass: its relations are added one by one."""
 
-from __future__ import annotations
-
 from collections import defaultdict, deque
 from collections.abc import Iterable, Sequence
 from heapq import heappop, heappush, heappushpop

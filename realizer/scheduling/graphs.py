@@ -1,7 +1,5 @@
 """Graph algorithms: longest paths, the cycles that prevent them, strong components, and tied points."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from realizer.core import work

@@ -1,7 +1,5 @@
 """Groups of clusters that must be solved together, and their convex problems."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

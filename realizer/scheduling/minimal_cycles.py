@@ -1,7 +1,5 @@
 """Search for the cycle of fewest statements through the points of a given cycle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 

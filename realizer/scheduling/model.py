@@ -1,7 +1,5 @@
 """The numeric form of a problem: tied points as classes, gaps and orders as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias

@@ -3,8 +3,6 @@
 Behaviours tied without a contradiction keep their preferred gaps; only the rest needs a solver.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

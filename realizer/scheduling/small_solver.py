@@ -4,8 +4,6 @@ Most blocks are such: a handful of behaviours, no orders, and time enough for al
 are slower than floats; so this does the same as `solve` with plain floats, and gives up in harder cases.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple

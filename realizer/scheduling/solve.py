@@ -5,8 +5,6 @@ solution of their gaps, then every free cluster slides to the earliest place tha
 clusters whose least squares violate an inequality go to the convex solver.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Detection of speech by loudness in sound that arrives in pieces."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Any

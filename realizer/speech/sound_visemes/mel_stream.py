@@ -1,7 +1,5 @@
 """Log-mel spectra of sound that arrives in pieces, and its running loudness and spectrum."""
 
-from __future__ import annotations
-
 from functools import lru_cache, partial
 from typing import NamedTuple
 

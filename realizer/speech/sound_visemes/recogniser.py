@@ -1,7 +1,5 @@
 """Phonemes of the mouth shapes that a small network hears in sound, while it arrives."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 
