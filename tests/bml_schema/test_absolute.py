@@ -1,7 +1,5 @@
 """Tests of blocks with absolute times."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

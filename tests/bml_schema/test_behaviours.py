@@ -1,7 +1,5 @@
 """Tests of the behaviours of BML 1.0."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import (

@@ -1,7 +1,5 @@
 """Tests of the first pass over a <bml> element."""
 
-from __future__ import annotations
-
 from lxml import etree
 
 from bml_schema import VOCABULARY, Head, Speech

@@ -1,7 +1,5 @@
 """Tests of the behaviours of BMLA and BMLT."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import (

@@ -1,7 +1,5 @@
 """Tests of canonical XML text."""
 
-from __future__ import annotations
-
 import pytest
 from lxml import etree
 

@@ -1,7 +1,5 @@
 """Tests of the reader of documents: decoding, limits, broken and several documents."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st

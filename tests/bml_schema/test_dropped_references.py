@@ -1,7 +1,5 @@
 """Tests of the removal of behaviours and of the references to them."""
 
-from __future__ import annotations
-
 from hypothesis import given
 from hypothesis import strategies as st
 

@@ -1,7 +1,5 @@
 """Tests of the reader of one element."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import (

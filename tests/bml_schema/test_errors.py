@@ -1,7 +1,5 @@
 """Tests of errors, problems and suggestions."""
 
-from __future__ import annotations
-
 import pickle
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of the behaviours that this project adds to BML."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import OWN, Behaviour, Block, Emotion, Fap, FapFile, Faps, Idle, Mood, Timeline, parse, write

@@ -1,7 +1,5 @@
 """Tests of BML feedback messages."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of node classes and their schemas."""
 
-from __future__ import annotations
-
 from dataclasses import FrozenInstanceError
 
 import pytest

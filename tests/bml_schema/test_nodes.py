@@ -1,7 +1,5 @@
 """Tests of blocks, constraints and their children."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Tests of the parser of one <bml> element."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import BMLA, CORE, Block, BMLError, Place, Required, SyncRef, Wait, parse, write

@@ -1,7 +1,5 @@
 """Tests of source positions."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

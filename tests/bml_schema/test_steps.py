@@ -1,7 +1,5 @@
 """The hook that reading and writing call for each element."""
 
-from __future__ import annotations
-
 import contextvars
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of the tolerant scanner."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema.tolerant_scanner import scan

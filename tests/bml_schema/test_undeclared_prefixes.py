@@ -1,7 +1,5 @@
 """Tests of documents with undeclared prefixes."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import BMLA, CORE, BMLSyntaxError, Head, Interrupt, parse, read

@@ -1,7 +1,5 @@
 """Tests of attribute values."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of the vocabulary."""
 
-from __future__ import annotations
-
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, VOCABULARY
 
 ELEMENTS = {

@@ -1,7 +1,5 @@
 """Tests of the writer of blocks."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,7 +1,5 @@
 """Tests of the XML schemas against node classes, the parser and the writer."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from pathlib import Path
 from typing import Any

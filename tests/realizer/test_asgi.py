@@ -1,7 +1,5 @@
 """The application that servers import."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

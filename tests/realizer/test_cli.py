@@ -1,7 +1,5 @@
 """The command line as its user sees it: texts, exit status, files."""
 
-from __future__ import annotations
-
 import json
 import socket
 import subprocess

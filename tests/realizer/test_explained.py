@@ -1,7 +1,5 @@
 """Tests of the eight steps of a document."""
 
-from __future__ import annotations
-
 import pytest
 
 import realizer

@@ -1,7 +1,5 @@
 """Tests of realize and schedule."""
 
-from __future__ import annotations
-
 import inspect
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tests of the pipeline: examples, golden values, sound and lips."""
 
-from __future__ import annotations
-
 import json
 from importlib.util import find_spec
 from pathlib import Path

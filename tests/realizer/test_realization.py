@@ -1,7 +1,5 @@
 """Tests of realizations."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

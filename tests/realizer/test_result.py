@@ -1,7 +1,5 @@
 """Tests of the result of `realizer.realize`."""
 
-from __future__ import annotations
-
 import base64
 import re
 from pathlib import Path

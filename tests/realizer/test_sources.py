@@ -1,7 +1,5 @@
 """Tests of sources of documents."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

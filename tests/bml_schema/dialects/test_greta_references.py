@@ -1,7 +1,5 @@
 """Tests of heads and faces that a description of Greta names."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import Block, parse

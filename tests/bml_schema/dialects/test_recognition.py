@@ -1,7 +1,5 @@
 """Tests of the recognition of words of dialects."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import Block, BMLError, parse, read

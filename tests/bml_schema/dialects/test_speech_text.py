@@ -1,7 +1,5 @@
 """Tests of speech in dialects."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import Block, Speech, Sync, parse, read

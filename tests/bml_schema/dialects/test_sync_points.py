@@ -1,7 +1,5 @@
 """Tests of sync points with names of dialects."""
 
-from __future__ import annotations
-
 import pytest
 from lxml import etree
 

@@ -1,7 +1,5 @@
 """Tests of the table of dialects."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of documents in dialects, and of each row of the table."""
 
-from __future__ import annotations
-
 import re
 from itertools import islice
 from pathlib import Path

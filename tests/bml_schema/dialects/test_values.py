@@ -1,7 +1,5 @@
 """Tests of values of dialects."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

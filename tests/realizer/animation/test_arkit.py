@@ -1,7 +1,5 @@
 """The weights of ARKit's blend shapes that show a face."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The columns of animation frames."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer import tables

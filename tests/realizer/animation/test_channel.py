@@ -1,7 +1,5 @@
 """Channels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Sampling of channels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters of faces with and without action units."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Short documents with options, and the outcomes of a batch of them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """A real Dask scheduler and real workers on this machine."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

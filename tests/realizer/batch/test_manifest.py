@@ -1,7 +1,5 @@
 """The manifest: rows survive a crash, and unchanged outputs are recognized."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

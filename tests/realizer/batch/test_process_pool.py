@@ -1,7 +1,5 @@
 """Local workers: all outcomes, although processes die."""
 
-from __future__ import annotations
-
 import os
 import signal
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Batches: resumed, idempotent, and with the same bytes on any workers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice

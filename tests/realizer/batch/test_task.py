@@ -1,7 +1,5 @@
 """The key of an output: another one as soon as anything that decides about the bytes is another."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A worker: the bytes of `realize`, and a row for each outcome."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Fixtures that play documents offline, and files for them to name."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass

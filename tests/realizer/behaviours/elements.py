@@ -1,7 +1,5 @@
 """Helpers that read an element as a behaviour, and give its timing, faults and channels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of emotion and mood."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

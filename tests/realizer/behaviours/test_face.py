@@ -1,7 +1,5 @@
 """Tests of faceLexeme, faceFacs, face and faceShift."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of faps and fapFile."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of the expansion of FAP 1 and 2."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of gaze targets."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

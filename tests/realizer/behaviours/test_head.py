@@ -1,7 +1,5 @@
 """Tests of head and headDirectionShift."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of idle."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of facekeyframe."""
 
-from __future__ import annotations
-
 import re
 from itertools import pairwise
 

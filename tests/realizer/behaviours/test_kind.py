@@ -1,7 +1,5 @@
 """Tests of the interface of behaviours."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

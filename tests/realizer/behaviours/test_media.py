@@ -1,7 +1,5 @@
 """Tests of files of the media folder."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

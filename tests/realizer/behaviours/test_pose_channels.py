@@ -1,7 +1,5 @@
 """Tests of channels that rise to a pose."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

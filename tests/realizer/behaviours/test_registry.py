@@ -1,7 +1,5 @@
 """Tests of the registry of behaviours, and of all behaviours by it."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import textwrap

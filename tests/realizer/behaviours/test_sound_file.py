@@ -1,7 +1,5 @@
 """Tests of the reader of sound files."""
 
-from __future__ import annotations
-
 import io
 import struct
 import wave

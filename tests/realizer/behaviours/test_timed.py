@@ -1,7 +1,5 @@
 """Tests of behaviours that are timed, and not shown on a face."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of timeline."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

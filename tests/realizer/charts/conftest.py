@@ -1,7 +1,5 @@
 """Documents played without a clock and without a voice, as the data of charts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import pytest

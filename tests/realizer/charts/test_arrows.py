@@ -1,7 +1,5 @@
 """Tests of the arrows of a chart."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.charts.diverging_scale import HELD, LINK, ROOM, TIGHT

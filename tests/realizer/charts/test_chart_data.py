@@ -1,7 +1,5 @@
 """Tests of the chart data of blocks that play."""
 
-from __future__ import annotations
-
 import json
 import math
 

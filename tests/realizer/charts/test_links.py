@@ -1,7 +1,5 @@
 """Tests of links between sync points."""
 
-from __future__ import annotations
-
 import pytest
 
 BLOCK = """<bml id="b"><wait id="w" start="1" duration="1"/><wait id="v" {} duration="1"/>{}</bml>"""

@@ -1,7 +1,5 @@
 """A picture of panels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.charts.panels import MOST, Panel, panels

@@ -1,7 +1,5 @@
 """Tests of the whole chart."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 

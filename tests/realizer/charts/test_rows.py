@@ -1,7 +1,5 @@
 """Tests of the rows of a chart."""
 
-from __future__ import annotations
-
 from realizer.charts.rows import draw_dropped, draw_row, height_of
 from realizer.charts.scale import Scale
 from realizer.charts.shapes import Picture, Text

@@ -1,7 +1,5 @@
 """Tests of the time axis."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of measuring and cutting text, and hatching."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Tests of the values of a chart and their JSON."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

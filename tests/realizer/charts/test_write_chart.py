@@ -1,7 +1,5 @@
 """Tests of writing charts to files."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.agreement`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.expressions`: what a film shows becomes an entry of the library."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

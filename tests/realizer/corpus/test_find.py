@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.find`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from realizer.corpus.find import agreement, find, segments

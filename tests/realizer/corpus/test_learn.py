@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.learn`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

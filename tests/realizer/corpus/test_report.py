@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.report`."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

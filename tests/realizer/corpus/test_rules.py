@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.rules`: what a corpus shows becomes rules that `enrich` applies."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

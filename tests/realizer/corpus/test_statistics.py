@@ -1,7 +1,5 @@
 """Tests of `realizer.corpus.statistics`: corpora made from Wojdel's tables give these tables back."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import pytest

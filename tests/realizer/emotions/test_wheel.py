@@ -1,7 +1,5 @@
 """Tests of `realizer.emotions.wheel`."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Tests of `realizer.emotions.words`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

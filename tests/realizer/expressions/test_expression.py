@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.expression`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.expressions.expression import key

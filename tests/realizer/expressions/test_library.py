@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.library`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.core.errors import TableError

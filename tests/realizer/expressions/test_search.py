@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.search`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.expressions.library import builtin

@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.timeline`."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.timeline_file`."""
 
-from __future__ import annotations
-
 import json
 import re
 

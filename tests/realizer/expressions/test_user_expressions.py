@@ -1,7 +1,5 @@
 """Tests of `realizer.expressions.user_expressions`."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of `realizer.knowledge.advice`."""
 
-from __future__ import annotations
-
 import pytest
 
 import realizer

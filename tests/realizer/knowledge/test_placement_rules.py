@@ -1,7 +1,5 @@
 """Tests of `realizer.knowledge.placement_rules`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.knowledge.placement_rules import place_expressions

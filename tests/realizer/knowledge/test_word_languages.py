@@ -1,7 +1,5 @@
 """Tests of `realizer.knowledge.word_languages`."""
 
-from __future__ import annotations
-
 import pytest
 
 from bml_schema import Speech, parse

@@ -1,7 +1,5 @@
 """Random problems as plain numbers, which can be built in any order and shrink well."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 

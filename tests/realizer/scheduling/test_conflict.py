@@ -1,7 +1,5 @@
 """Tests of conflicts and of the graph of equalities."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

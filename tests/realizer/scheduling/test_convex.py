@@ -1,7 +1,5 @@
 """Tests of the active-set method against the interior point method."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Laws of the scheduling of random documents."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from random import Random
 from typing import NamedTuple

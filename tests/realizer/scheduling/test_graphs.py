@@ -1,7 +1,5 @@
 """Tests of longest paths and strong components."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Tests of groups whose least squares solution violates an inequality."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

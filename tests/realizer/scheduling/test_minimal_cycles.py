@@ -1,7 +1,5 @@
 """Tests of conflicts against linear programs: none is too large, and none could be shorter."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

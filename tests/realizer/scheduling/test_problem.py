@@ -1,7 +1,5 @@
 """Tests of the scheduling problem of blocks."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Tests of least squares and of the imports for large blocks."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """Tests of the scheduling of documents, with the figures 3.5 to 3.7 of Paul 2010."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tests of the solver for small problems against the one in arrays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import assume, given

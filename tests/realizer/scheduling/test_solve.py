@@ -1,7 +1,5 @@
 """Laws of the solver on random problems, and a comparison with solvers of SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import assume, example, given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Tests of timings, warnings and schedules."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Tests of blocks that are scheduled together."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """One engine of each kind for all tests, which are skipped with a hint if their engine is not installed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """A worker without speech, for the tests of processes; its requests say what it does."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

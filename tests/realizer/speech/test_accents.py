@@ -1,7 +1,5 @@
 """Phrases and accents of speech."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Bad texts and dead engines in documents: one clear warning, and everything else plays."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """The base class of voices."""
 
-from __future__ import annotations
-
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
 

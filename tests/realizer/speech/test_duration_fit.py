@@ -1,7 +1,5 @@
 """Speech of a given length."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Voices with an engine: what happens before the engine is used."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

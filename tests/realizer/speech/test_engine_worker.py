@@ -1,7 +1,5 @@
 """The process around an engine."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

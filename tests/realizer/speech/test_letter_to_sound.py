@@ -1,7 +1,5 @@
 """Vowel units and phonemes of written words."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

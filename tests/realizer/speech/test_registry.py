@@ -1,7 +1,5 @@
 """The registry of voices, with and without their engines."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The silent voice: times of words, marks and phonemes."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Attributes of SSML's <prosody>."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.speech.ssml_prosody import PLAIN, Prosody

@@ -1,7 +1,5 @@
 """The data types of speech."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 from hypothesis import given

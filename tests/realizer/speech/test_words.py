@@ -1,7 +1,5 @@
 """Words, pauses and marks of a script."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.arkit_names`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.cooccurrence`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.emotions`."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

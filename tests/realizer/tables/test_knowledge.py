@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.knowledge`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import get_args

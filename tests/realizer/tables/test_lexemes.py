@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.lexemes`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.core.errors import TableError

@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.phonemes`."""
 
-from __future__ import annotations
-
 from realizer.tables.phonemes import phoneme_features, vowels
 
 

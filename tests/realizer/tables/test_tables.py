@@ -1,7 +1,5 @@
 """Tests of the tables and of their readers."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.templates`."""
 
-from __future__ import annotations
-
 import pytest
 
 from realizer.tables.templates import templates

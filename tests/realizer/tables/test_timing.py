@@ -1,7 +1,5 @@
 """Tests of `realizer.tables.timing`."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

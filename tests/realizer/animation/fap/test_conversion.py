@@ -1,7 +1,5 @@
 """The conversion of AUs to FAPs."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

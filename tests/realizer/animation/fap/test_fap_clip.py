@@ -1,7 +1,5 @@
 """FAP clips at other rates, and cut."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

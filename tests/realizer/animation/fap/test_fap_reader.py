@@ -1,7 +1,5 @@
 """The reader of FAP files."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lip closures: their durations, and when speech masks the lips."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Dominance functions: greatest in the middle of a sound, and never more than 1 in all."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Lips: known phonemes, and laws for any sequence of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

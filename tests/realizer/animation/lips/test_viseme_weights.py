@@ -1,7 +1,5 @@
 """Weights of visemes: the spoken one is the greatest, closures are alone, and they add up to 1."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

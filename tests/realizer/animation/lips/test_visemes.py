@@ -1,7 +1,5 @@
 """Conversion of IPA to visemes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """A sentence with known times, by a voice that no aligner uses."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Alignment of recordings with their texts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The result of aligners."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """The cheapest path through states with pauses between words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

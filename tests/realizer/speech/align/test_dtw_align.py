@@ -1,7 +1,5 @@
 """Alignment by a voice that speaks the same text."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Cepstra, loudness and voice activity."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Alignment with pocketsphinx."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

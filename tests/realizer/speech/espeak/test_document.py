@@ -1,7 +1,5 @@
 """The SSML for espeak-ng, and the places of words in it."""
 
-from __future__ import annotations
-
 from realizer.speech.espeak.document import write_document
 from realizer.speech.ssml import read_script
 from realizer.speech.utterance import SpeechRequest

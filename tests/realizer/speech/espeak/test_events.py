@@ -1,7 +1,5 @@
 """Times from the events of espeak-ng, made up and real."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib.util
 from pathlib import Path

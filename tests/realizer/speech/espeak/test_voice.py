@@ -1,7 +1,5 @@
 """espeak-ng, with a test for each of its known traps."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The worker of espeak-ng, which is only loaded in a process of its own."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Times of words and phonemes from the readings of hibari."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The neural voice: times compared with the sound, and odd texts."""
 
-from __future__ import annotations
-
 import threading
 from dataclasses import replace
 from itertools import pairwise

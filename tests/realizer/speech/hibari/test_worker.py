@@ -1,7 +1,5 @@
 """The worker of hibari, without its model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Recordings with known times as utterances."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Mel frames of sound in pieces."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Mouth shapes that are recognised in sound."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
