@@ -5,9 +5,8 @@ Unknown attributes are reported too, and nothing is dropped because of them.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import count
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -80,9 +79,8 @@ def read_block(
     outline = BlockOutline(elements, names)
     tree = outline.entries(root, "/bml", required=False)
     reader = _Reader(outline, lines)
-    entries = flat(tree)
-    if len(entries) > max_behaviours:
-        text = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {len(entries)}"
+    if (count := len(flat(tree))) > max_behaviours:
+        text = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {count}"
         raise BMLSizeError(text, line=line, path="/bml", block=names.block)
     if notes:
         reader.problem(names.block, Fault("; ".join(notes), root, NOT_BML_1_0), "/bml", root, dropped=False)
@@ -96,22 +94,15 @@ def read_block(
         reader.problem(
             names.block, Fault(f"wanted elements, got the text {quoted(text)}", parent), path, parent
         )
-    nodes: dict[int, Behaviour | Constraint] = {}
-    for n, entry in enumerate(entries):
-        next_element()
-        read = reader.constraint if entry.kind.tag == Constraint.tag else reader.behaviour
-        node = read(entry)
-        if node is not None:
-            nodes[n] = node
+    children = tuple(reader.children(tree))
     next_element()
-    reader.prune(nodes)
-    for node in nodes.values():
-        if isinstance(node, Constraint) and node.id and node.place:
-            reader.places.setdefault(node.id, node.place)
+    block = Block(**values, children=children, problems=tuple(reader.problems), places=reader.places)
+    block = reader.pruned(block)
+    for constraint in block.constraints:
+        if constraint.id and constraint.place:
+            reader.places.setdefault(constraint.id, constraint.place)
     next_element()
-    return Block(
-        **values, children=_grouped(tree, nodes), problems=tuple(reader.problems), places=reader.places
-    )
+    return block
 
 
 def read_behaviour(element: etree._Element, vocabulary: Vocabulary) -> Behaviour | None:
@@ -194,28 +185,41 @@ class _Reader:
         self.problems: list[Problem] = []
         self.places: dict[str, Place] = {}
 
-    def behaviour(self, entry: Entry) -> Behaviour | None:
+    def children(self, tree: list[Entry | list[Entry]]) -> Iterator[Behaviour | Required | Constraint]:
+        """Yield the nodes of a tree of entries, without those that are dropped."""
+        for item in tree:
+            if isinstance(item, list):
+                inside = map(self.node, item)
+                yield Required(children=tuple(node for node in inside if node is not None))
+            elif (node := self.node(item)) is not None:
+                yield node
+
+    def node(self, entry: Entry) -> Behaviour | Constraint | None:
         """Return the node of an entry, or None, with a Problem, if it is dropped."""
-        element = entry.element
+        next_element()
+        remarks = self.elements.remarks
         try:
-            cls = entry.kind.cls
-            if cls is None:
-                raise self.unknown(entry)
-            owner = self.owners.get(entry.id, entry)
-            if owner is not entry:
-                line = self.line(owner.element)
-                raise Fault(
-                    f"id: wanted one of its own, got {quoted(entry.id)}, which line {line} has", element
-                )
-            node: Behaviour = self.elements.node(cls, element, timed=True)
+            is_constraint = entry.kind.tag == Constraint.tag
+            node = self.constraint(entry) if is_constraint else self.behaviour(entry)
         except Fault as fault:
-            self.elements.remarks.clear()  # it is dropped anyway
-            id = entry.id if 0 < len(entry.id) <= _MAX_ID else entry.path
-            self.problem(f"{self.names.block}:{id}", fault, entry.path, element, entry.required)
-            return None
+            self.problem(self.warned(entry), fault, entry.path, entry.element, entry.required)
+            node = None
+            remarks.clear()
+        for remark in remarks:
+            self.problem(self.warned(entry), remark, entry.path, entry.element, dropped=False)
+        remarks.clear()
+        return node
+
+    def behaviour(self, entry: Entry) -> Behaviour:
+        cls, element = entry.kind.cls, entry.element
+        if cls is None:
+            raise self.unknown(entry)
+        owner = self.owners.get(entry.id, entry)
+        if owner is not entry:
+            line = self.line(owner.element)
+            raise Fault(f"id: wanted one of its own, got {quoted(entry.id)}, which line {line} has", element)
+        node: Behaviour = self.elements.node(cls, element, timed=True)
         self.places[node.id] = Place(self.line(element), entry.path)
-        if self.elements.remarks:
-            self.report_remarks(f"{self.names.block}:{node.id}", entry)
         return node
 
     def unknown(self, entry: Entry) -> Fault:
@@ -234,45 +238,25 @@ class _Reader:
             hint = hint or self.names.suggest(name, map(local, known), 0.7)
         return Fault(f"no behaviour <{name}> in BML 1.0{hint}", element, BEHAVIOR_TYPE_NOT_SUPPORTED)
 
-    def report_remarks(self, id: str, entry: Entry) -> None:
-        """Report faults that cost no behaviour, one Problem for each element."""
-        for fault in self.elements.remarks:
-            self.problem(id, fault, entry.path, entry.element, dropped=False)
-        self.elements.remarks.clear()
-
-    def constraint(self, entry: Entry) -> Constraint | None:
-        """Return the node of an entry, or None, with a Problem, if it is dropped."""
-        element = entry.element
-        try:
-            values = self.elements.constraint(element)
-        except Fault as fault:
-            self.elements.remarks.clear()
-            self.problem(self.warned(entry.id), fault, entry.path, element, entry.required)
-            return None
-        self.report_remarks(self.warned(values.get("id")), entry)
-        place = Place(self.line(element), entry.path)
+    def constraint(self, entry: Entry) -> Constraint:
+        values = self.elements.constraint(entry.element)
+        place = Place(self.line(entry.element), entry.path)
         return Constraint(**values, required=entry.required, place=place)
 
-    def warned(self, constraint: str | None) -> str:
-        """Return the id of warnings about a constraint, which may have none."""
-        known = constraint and len(constraint) <= _MAX_ID
-        return f"{self.names.block}:{constraint}" if known else self.names.block
+    def warned(self, entry: Entry) -> str:
+        """Return the id of warnings about an entry, which may have none."""
+        if 0 < len(entry.id) <= _MAX_ID:
+            return f"{self.names.block}:{entry.id}"
+        is_constraint = entry.kind.tag == Constraint.tag
+        return self.names.block if is_constraint else f"{self.names.block}:{entry.path}"
 
-    # References to dropped behaviours
-
-    def prune(self, nodes: dict[int, Behaviour | Constraint]) -> None:
-        """Remove references to dropped behaviours from the other nodes, and name them in the Problems."""
+    def pruned(self, block: Block) -> Block:
+        """Return the block without references to dropped behaviours, which are named in their Problems."""
         gone = self.owners.keys() - self.places.keys()
         if not gone:
-            return
+            return block
         remover = ReferenceRemover(gone)
-        for n, node in list(nodes.items()):
-            left = remover.without(node)
-            if left is None:
-                del nodes[n]
-            else:
-                nodes[n] = left
-        prefix = f"{self.names.block}:"
+        rest, prefix = block.with_children(remover.without), f"{self.names.block}:"
         for n, problem in enumerate(self.problems):
             id = problem.id.removeprefix(prefix) if problem.id.startswith(prefix) else ""
             lost = tuple(remover.lost_references.pop(id, ()))
@@ -280,6 +264,7 @@ class _Reader:
                 text = f"{problem.text}; with it went {listed(lost)}"
                 fatal = problem.fatal or id in remover.fatal
                 self.problems[n] = replace(problem, text=text, lost_references=lost, fatal=fatal)
+        return replace(rest, problems=tuple(self.problems))
 
     def problem(
         self,
@@ -303,21 +288,6 @@ class _Reader:
                 dropped=dropped,
             )
         )
-
-
-def _grouped(
-    tree: list[Entry | list[Entry]], nodes: Mapping[int, Behaviour | Constraint]
-) -> tuple[Behaviour | Required | Constraint, ...]:
-    """Arrange the remaining nodes in the tree of their entries."""
-    numbers = count()
-    out: list[Behaviour | Required | Constraint] = []
-    for item in tree:
-        if isinstance(item, list):
-            inside = (nodes.get(next(numbers)) for _ in item)
-            out.append(Required(children=tuple(node for node in inside if node is not None)))
-        elif (node := nodes.get(next(numbers))) is not None:
-            out.append(node)
-    return tuple(out)
 
 
 def _path_below(element: etree._Element, top: etree._Element, path: str) -> str:
