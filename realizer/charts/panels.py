@@ -8,7 +8,7 @@ import numpy as np
 
 from realizer.charts.diverging_scale import FAINT, GRID, INK
 from realizer.charts.scale import GUTTER, WIDTH, Scale
-from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut
+from realizer.charts.shapes import Box, Path, Picture, Text, cut, moved
 from realizer.core.array_types import Float64
 
 LINE = 16.0  # height of a line of text
@@ -47,7 +47,7 @@ def panels(title: str, parts: Sequence[Panel], scale: Scale) -> Picture:
         if part.curves is not None and part.times is not None:
             y = _curves(picture, part.curves, part.times, scale, y)
         if part.inset is not None:
-            picture.add(*(_moved(shape, y) for shape in part.inset.shapes))
+            picture.add(*(moved(shape, 0.0, y) for shape in part.inset.shapes))
             y += part.inset.height
         y += 10
     return replace(picture, height=y)
@@ -78,9 +78,3 @@ def _curves(picture: Picture, values: Float64, times: Float64, scale: Scale, y: 
         points = zip(times.tolist(), heights.tolist(), strict=True)
         picture.add(Path(tuple((scale.x(time), zero - height) for time, height in points), colour, 1.4))
     return y + CURVES
-
-
-def _moved(shape: Shape, down: float) -> Shape:
-    if isinstance(shape, Path):
-        return replace(shape, points=tuple((x, y + down) for x, y in shape.points))
-    return replace(shape, y=shape.y + down)

@@ -1,7 +1,7 @@
 """The chart of blocks: a row a behaviour, time from left to right."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from realizer.charts.arrows import Arrows, Place
@@ -20,7 +20,7 @@ from realizer.charts.diverging_scale import (
 )
 from realizer.charts.rows import HEIGHT, NAME, draw_dropped, draw_row, height_of
 from realizer.charts.scale import Scale, last_of, scale_of
-from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, hatch, width_of
+from realizer.charts.shapes import Box, Path, Picture, Shape, Text, cut_inside, hatch, moved, width_of
 from realizer.charts.timeline import BehaviourRow, BlockChart
 
 SIZE = 10.5
@@ -46,55 +46,37 @@ def draw_legend(picture: Picture, scale: Scale, top: float, blocks: Sequence[Blo
     for mark, words in _marks(blocks):
         if x + 30 + width_of(words, SIZE) > scale.right:
             x, row = NAME, row + (38 if row == y else 20)
-        mark(picture, x, row)
+        picture.add(*(moved(shape, x, row) for shape in mark))
         picture.add(Text(x + 26, row + 10, words, SIZE, FAINT))
         x += 26 + width_of(words, SIZE) + 22
     return row + (34 if row == y else 22)
 
 
-Mark = Callable[[Picture, float, float], None]
+# Marks at the corner of a picture.
+_RIGID = [Box(0, 0, 20, 12, RIGID, "#4b5563")]
+_TIE: list[Shape] = [
+    Box(0, 3.5, 5, 5, LINK, radius=2.5),
+    Path(((2, 6), (15, 6)), LINK, 1.3),
+    Path(((20, 6), (14, 2.5), (14, 9.5)), fill=LINK),
+]
+_PIN = [Path(((12, 10), (8, 3), (16, 3)), HELD, 1.0, fill=HELD)]
+_ROOM = [*hatch(0, 2, 20, 8, ROOM), Path(((16, 2), (20, 2), (20, 10), (16, 10)), ROOM, 1.6)]
+_TIGHT = [Path(((14, 2), (18, 2), (18, 10), (14, 10)), TIGHT, 1.6)]
+_LOST: list[Shape] = [Box(0, 0, 20, 12, "#f3f4f6", radius=2), *hatch(0, 0, 12, 12, LOST, 6)]
 
 
-def _marks(blocks: Sequence[BlockChart]) -> list[tuple[Mark, str]]:
+def _marks(blocks: Sequence[BlockChart]) -> list[tuple[Sequence[Shape], str]]:
     lines = [line for block in blocks for line in block.rows]
     links = [link for line in lines for link in line.links]
-    marks: list[tuple[Mark, str, bool]] = [
-        (_rigid, "cannot give way", any(g.rigid or g.preferred is None for line in lines for g in line.gaps)),
-        (_tie, "follows another point", any(link.slack is None and link.target for link in links)),
-        (_pin, "held at a time", any(link.slack is None and not link.target for link in links)),
-        (_room, "room before it binds", any(link.slack is not None and not link.binds for link in links)),
-        (_tight, "binds", any(link.binds for link in links)),
-        (_lost, "dropped, and why", any(block.dropped for block in blocks)),
+    marks: list[tuple[Sequence[Shape], str, bool]] = [
+        (_RIGID, "cannot give way", any(g.rigid or g.preferred is None for line in lines for g in line.gaps)),
+        (_TIE, "follows another point", any(link.slack is None and link.target for link in links)),
+        (_PIN, "held at a time", any(link.slack is None and not link.target for link in links)),
+        (_ROOM, "room before it binds", any(link.slack is not None and not link.binds for link in links)),
+        (_TIGHT, "binds", any(link.binds for link in links)),
+        (_LOST, "dropped, and why", any(block.dropped for block in blocks)),
     ]
     return [(mark, words) for mark, words, there in marks if there]
-
-
-def _rigid(picture: Picture, x: float, y: float) -> None:
-    picture.add(Box(x, y, 20, 12, RIGID, "#4b5563"))
-
-
-def _tie(picture: Picture, x: float, y: float) -> None:
-    picture.add(Box(x, y + 3.5, 5, 5, LINK, radius=2.5))
-    picture.add(Path(((x + 2, y + 6), (x + 15, y + 6)), LINK, 1.3))
-    picture.add(Path(((x + 20, y + 6), (x + 14, y + 2.5), (x + 14, y + 9.5)), fill=LINK))
-
-
-def _pin(picture: Picture, x: float, y: float) -> None:
-    picture.add(Path(((x + 12, y + 10), (x + 8, y + 3), (x + 16, y + 3)), HELD, 1.0, fill=HELD))
-
-
-def _room(picture: Picture, x: float, y: float) -> None:
-    picture.add(*hatch(x, y + 2, 20, 8, ROOM))
-    picture.add(Path(((x + 16, y + 2), (x + 20, y + 2), (x + 20, y + 10), (x + 16, y + 10)), ROOM, 1.6))
-
-
-def _tight(picture: Picture, x: float, y: float) -> None:
-    picture.add(Path(((x + 14, y + 2), (x + 18, y + 2), (x + 18, y + 10), (x + 14, y + 10)), TIGHT, 1.6))
-
-
-def _lost(picture: Picture, x: float, y: float) -> None:
-    picture.add(Box(x, y, 20, 12, "#f3f4f6", radius=2))
-    picture.add(*hatch(x, y, 12, 12, LOST, 6))
 
 
 AXIS = 30.0
