@@ -26,7 +26,8 @@ from realizer.behaviours.media import MediaError, media_file
 from realizer.behaviours.pose_channels import express
 from realizer.core.array_types import Float64
 from realizer.emotions.archetypes import archetypes, is_profile_file, split_set
-from realizer.emotions.wheel import affect, blend_weights, place_of_affect, strength_at, wheel
+from realizer.emotions.chosen import emotion_and_shares
+from realizer.emotions.wheel import blend_weights, place_of_affect, strength_at
 from realizer.emotions.words import UnknownWordError, known_words, place_of, strength_of
 from realizer.emotions.words import emotion as profile_of
 from realizer.scheduling.timing import Timing
@@ -118,12 +119,8 @@ def values_of(node: Emotion | Mood, context: PlanningContext = NO_MEDIA) -> dict
     """
     profiles = _set_of(node, context)
     if profiles != "own":
-        if node.angle is not None:
-            profile = wheel(node.angle, node.activation, profiles)
-        elif node.valence is not None and node.arousal is not None:
-            profile = affect(node.valence, node.arousal, profiles)
-        else:
-            profile = profile_of(node.name or "", profiles)
+        affect = node.valence, node.arousal
+        profile, _ = emotion_and_shares(node.name, node.angle, node.activation, affect, profiles)
         frame = profile.frame() if node.seed is None else profile.draw(node.seed)
         return {fap(number): node.intensity * float(frame[number - 1]) for number in profile.ranges}
     aus = _aus(EmotionRequest.of(node, profiles))

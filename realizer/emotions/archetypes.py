@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from realizer.emotions.profile import Profile, read_profiles, split_number
-from realizer.tables.emotions import emotion_model, own_ranges, published_ranges
+from realizer.tables.emotions import PublishedRange, emotion_model, own_ranges, published_ranges
 
 SETS = ("own", "published", "raw")
 
@@ -74,12 +74,10 @@ def _profiles_of(name: str) -> tuple[Profile, ...]:
     if name not in SETS:
         raise ValueError(f"profiles: wanted {', '.join(SETS)} or a file FILE.txt, got {name[:60]!r}")
     ranges: dict[tuple[str, int], dict[int, tuple[float, float]]] = {}
-    if name == "own":
-        for own in own_ranges():
-            ranges.setdefault((own.emotion, own.profile), {})[own.fap] = own.low, own.high
-    else:
-        for row in published_ranges():
-            low, high = (row.raw_low, row.raw_high) if name == "raw" else (row.low, row.high)
-            # Some ranges are printed backwards.
-            ranges.setdefault((row.emotion, row.profile), {})[row.fap] = min(low, high), max(low, high)
+    for row in own_ranges() if name == "own" else published_ranges():
+        ends = row.low, row.high
+        if isinstance(row, PublishedRange) and name == "raw":
+            ends = row.raw_low, row.raw_high
+        # Some ranges are printed backwards.
+        ranges.setdefault((row.emotion, row.profile), {})[row.fap] = min(ends), max(ends)
     return tuple(Profile(f"{emotion} {number}", name, faps) for (emotion, number), faps in ranges.items())

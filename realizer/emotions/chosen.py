@@ -1,10 +1,9 @@
 """The profile of an emotion that is given as a word or as a place: `realizer.emotion`."""
 
-import math
 from collections.abc import Mapping
 
 from realizer.emotions.profile import Profile
-from realizer.emotions.wheel import affect, blend_weights, wheel
+from realizer.emotions.wheel import affect, blend_weights, place_of_affect, wheel
 from realizer.emotions.words import emotion as profile_of
 
 
@@ -57,6 +56,6 @@ def emotion_and_shares(
     if angle is not None:
         return wheel(angle, activation, profiles), blend_weights(angle, profiles)
     if valence is not None and arousal is not None:
-        degrees = math.degrees(math.atan2(arousal, valence))
+        degrees, _ = place_of_affect(valence, arousal)
         return affect(valence, arousal, profiles), blend_weights(degrees, profiles, "affect")
     return profile_of(word or "", profiles), {}
