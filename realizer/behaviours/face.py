@@ -22,8 +22,10 @@ Part: TypeAlias = FaceLexeme | FaceFacs
 SETTLE = 0.25
 
 
-def timing_of_lexeme(node: FaceLexeme, context: PlanningContext) -> Timing:
-    return from_gaps(PEAK, context.library[node.lexeme].gaps)
+def timing(node: FaceLexeme | Expression, context: PlanningContext) -> Timing:
+    """Return the onset, apex and offset of the library; those of templates were measured."""
+    name = node.lexeme if isinstance(node, FaceLexeme) else node.name
+    return from_gaps(PEAK, context.library[name].gaps)
 
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
@@ -104,11 +106,6 @@ def check(node: Part | Face | FaceShift, context: PlanningContext) -> tuple[Faul
     return tuple(faults)
 
 
-def expression_timing(node: Expression, context: PlanningContext) -> Timing:
-    """Return the onset, apex and offset of the library; those of templates were measured."""
-    return from_gaps(PEAK, context.library[node.name].gaps)
-
-
 def expand_expression(node: Expression, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
     values = pose_channels.columns(context.library[node.name].aus, node.intensity)
     return express(pose_channels.hold(values, times, node.id), context)
@@ -126,7 +123,7 @@ def expand_blink(node: Blink, times: Float64, context: PlanningContext) -> tuple
 
 AMOUNT = {"amount": "amount"}
 KINDS = (
-    BehaviourKind(FaceLexeme, timing_of_lexeme, expand_part, check, parameters=AMOUNT),
+    BehaviourKind(FaceLexeme, timing, expand_part, check, parameters=AMOUNT),
     BehaviourKind(FaceFacs, table_timing("faceFacs"), expand_part, check, parameters=AMOUNT),
     BehaviourKind(Face, table_timing("face"), expand_face, check, parameters=AMOUNT),
     BehaviourKind(
@@ -134,7 +131,7 @@ KINDS = (
     ),
     BehaviourKind(
         Expression,
-        expression_timing,
+        timing,
         expand_expression,
         check_expression,
         parameters={"intensity": "intensity", "amount": "intensity"},
