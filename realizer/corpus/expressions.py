@@ -17,6 +17,7 @@ from realizer.corpus.matching_pursuit import explain
 from realizer.corpus.recording import Recording, Segment
 from realizer.corpus.statistics import FEWEST, Study
 from realizer.tables import action_units, au_to_fap
+from realizer.tables.lexemes import SIDES
 from realizer.tables.templates import PREFIX
 from realizer.tables.timing import gaps
 
@@ -97,14 +98,13 @@ def write_expressions(folder: Path, study: Study) -> list[str]:
 def _units() -> tuple[tuple[str, ...], Float64]:
     """Return names and millimetres (n, 68) of the action units that move FAPs, of both sides and of each."""
     moving = {row.au for row in au_to_fap()} & {*SEEN}
-    sides = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
     keys = [
         (row.au, side)
         for row in action_units()
         if row.au in moving
-        for side in (sides if row.sides else ("",))
+        for side in (SIDES if row.sides else ("",))
     ]
-    shown = faps_of(np.stack([au_row({(number, sides[side]): 1.0}) for number, side in keys]))
+    shown = faps_of(np.stack([au_row({(number, SIDES[side]): 1.0}) for number, side in keys]))
     return tuple(f"{number}{side}" for number, side in keys), features(Recording("", faps=shown))
 
 

@@ -35,11 +35,11 @@ from realizer.outputs.speech_spans import Span
 from realizer.outputs.textgrid import intervals_text
 from realizer.tables import faps
 from realizer.tables.arkit_names import shapes
+from realizer.tables.lexemes import SIDES
 
 WORD_TIER = re.compile(r"words?\b\s*(.*)", re.IGNORECASE)
 INTERVAL = re.compile(r'xmin = ([\d.eE+-]+)\s*xmax = ([\d.eE+-]+)\s*text = "((?:[^"]|"")*)"')
 TIER = re.compile(r'class = "IntervalTier"\s*name = "((?:[^"]|"")*)"')
-SIDES = {"L": "LEFT", "R": "RIGHT", "": "BOTH"}
 EAF = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <ANNOTATION_DOCUMENT AUTHOR="" FORMAT="3.0" VERSION="3.0">

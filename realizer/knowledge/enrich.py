@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from typing import NamedTuple
 
 from bml_schema import Block, Expression, Speech, Sync, SyncRef
@@ -196,7 +197,7 @@ class _IdFactory:
 
     def __init__(self, block: Block) -> None:
         self.used = {node.id for node in block.behaviours}
-        self.numbers: dict[str, int] = {}
+        self.numbers: dict[str, Iterator[int]] = {}
 
     def behaviour(self, stem: str) -> str:
         return self._new(stem.replace(" ", "-"))
@@ -206,12 +207,10 @@ class _IdFactory:
         return self._new("w")
 
     def _new(self, stem: str) -> str:
-        number = self.numbers.get(stem, 1)
-        while f"{stem}{number}" in self.used:
-            number += 1
-        self.numbers[stem] = number + 1
-        self.used.add(f"{stem}{number}")
-        return f"{stem}{number}"
+        numbers = self.numbers.setdefault(stem, count(1))
+        id = next(id for number in numbers if (id := f"{stem}{number}") not in self.used)
+        self.used.add(id)
+        return id
 
 
 def _around(node: Expression, company: CompanionRule) -> tuple[SyncRef | None, SyncRef | None]:

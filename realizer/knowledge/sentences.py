@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from realizer.speech.letter_to_sound import syllable_facts, vowel_units
+from realizer.speech.letter_to_sound import subtag, syllable_facts, vowel_units
 from realizer.speech.words import words_in
 
 QUESTION, EXCLAMATION = "?？؟՞\u037e", "!！՜"  # U+037E is the Greek one, which looks like a semicolon
@@ -42,7 +42,7 @@ class Sentence:
 def sentences(text: str, language: str = "en") -> tuple[Sentence, ...]:
     """Return the sentences of a text that have words; the language, a BCP-47 tag, defines the vowels."""
     unit = float(syllable_facts()["unit"])  # s of a vowel unit
-    if language.replace("_", "-").partition("-")[0].lower() == "el":
+    if subtag(language) == "el":
         text = text.replace(";", "\u037e")  # the Greek question mark; keyboards write a semicolon
     found: list[Sentence] = []
     now = 0.0

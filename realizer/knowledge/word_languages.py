@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from bml_schema import Block, Speech
 from bml_schema.nodes import LANGUAGE, SSML
+from realizer.speech.letter_to_sound import subtag
 from realizer.tables.emotional_words import WordList, word_list
 
 
@@ -19,7 +20,7 @@ class Words:
 
     def of(self, language: str) -> WordList | None:
         """Return the words of a language ("en-GB" is "en"), or None if there is no list."""
-        if self.own is not None and (self.everywhere or _same(language, self.language)):
+        if self.own is not None and (self.everywhere or subtag(language) == subtag(self.language)):
             return self.own
         return word_list(language)
 
@@ -48,9 +49,3 @@ def _ssml_language(content: str) -> str | None:
         return ElementTree.fromstring(content).get(LANGUAGE)
     except ElementTree.ParseError:
         return None
-
-
-def _same(one: str, other: str) -> bool:
-    """Return whether two tags have the same language, ignoring the country."""
-    first, second = (tag.replace("_", "-").partition("-")[0].lower() for tag in (one, other))
-    return first == second
