@@ -125,11 +125,7 @@ def read(
         return
     try:
         text = _decoded(text) if isinstance(text, bytes) else text
-    except BMLError as error:
-        yield error
-        return
-    text = text if strict_bml else without_doctype(text)
-    try:
+        text = text if strict_bml else without_doctype(text)
         spans = list(document_spans(text))
     except BMLError as error:
         yield error

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from bml_schema.errors import did_you_mean, quoted
@@ -100,7 +100,7 @@ def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
         raise ValueError(describe_mismatch(_WANTED, text, quoted(text)))
     if names is None:
         return readings[-1]
-    readings = [_own(r, names) for r in readings]
+    readings = [replace(r, block=None) if r.block == names.block else r for r in readings]
     for reading in readings:
         if reading.block is None and not _missing(reading, names):
             return _single_stroke(reading, names)
@@ -147,18 +147,11 @@ def _point(text: str, offset: str) -> SyncRef | None:
     )
 
 
-def _own(ref: SyncRef, names: Names) -> SyncRef:
-    if ref.block != names.block:
-        return ref
-    return SyncRef(behaviour=ref.behaviour, sync=ref.sync, index=ref.index, offset=ref.offset)
-
-
 def _single_stroke(ref: SyncRef, names: Names) -> SyncRef:
     """Replace stroke:1 of a behaviour with one stroke by stroke."""
     points = names.points.get(ref.behaviour or "")
-    if ref.index != 1 or points is None or points.strokes != 1:
-        return ref
-    return SyncRef(behaviour=ref.behaviour, sync=ref.sync, offset=ref.offset)
+    is_single = ref.index == 1 and points is not None and points.strokes == 1
+    return replace(ref, index=None) if is_single else ref
 
 
 def _missing(ref: SyncRef, names: Names, say: bool = False) -> str:

@@ -53,9 +53,10 @@ def _rewrite(text: Any, source: Any, apply: Callable[[Row], None]) -> None:
         if local(str(child.tag)) != "description":
             content.add(child)
         content.add_text(child.tail)
-    if content.is_empty:
+    if not "".join(content.element.itertext()).strip():
         content.add_text(source.get("text"))
-    content.write(text)
+    text[:] = content.element[:]
+    text.text = content.element.text
 
 
 def _is_marked(text: Any) -> bool:
@@ -63,21 +64,20 @@ def _is_marked(text: Any) -> bool:
 
 
 class _Content:
-    """The words and <sync> elements of a text, in order."""
+    """The words and <sync> elements of a text, in order, inside an element."""
 
     def __init__(self, tag: str, apply: Callable[[Row], None]) -> None:
         self.tag = tag
         self.apply = apply
-        self.parts: list[str | Any] = []
+        self.element: Any = etree.Element("text")
+        self.last: Any = None  # the last child of the element
         self.ids: set[str] = set()
 
-    @property
-    def is_empty(self) -> bool:
-        return not any(isinstance(part, str) and part.strip() for part in self.parts)
-
     def add_text(self, text: str | None) -> None:
-        if text:
-            self.parts.append(text)
+        if self.last is None:
+            self.element.text = (self.element.text or "") + (text or "")
+        else:
+            self.last.tail = (self.last.tail or "") + (text or "")
 
     def add(self, element: Any) -> None:
         """Add an element: a mark as a sync, any other as the words inside it."""
@@ -92,24 +92,10 @@ class _Content:
                 sync = etree.Element(self.tag, {k: v for k, v in element.items() if k == "ref"})
                 sync.set("id", id)
                 sync.sourceline = element.sourceline
-                self.parts.append(sync)
+                self.element.append(sync)
+                self.last = sync
         elif row is None or row.becomes != "-":
             self.add_text(element.text)
             for child in element:
                 self.add(child)
                 self.add_text(child.tail)
-
-    def write(self, text: Any) -> None:
-        """Replace the content of <text>."""
-        del text[:]
-        text.text = ""
-        last = None
-        for part in self.parts:
-            if not isinstance(part, str):
-                text.append(part)
-                last = part
-                last.tail = ""
-            elif last is None:
-                text.text += part
-            else:
-                last.tail += part
