@@ -169,10 +169,10 @@ def prediction_of(node: Behaviour, block: str, times: Mapping[str, float], late:
     )
     if isinstance(node, Speech):
         refs = {p: SyncRef(offset=round(time, 6)) for p, time in times.items() if p not in node.sync_points}
-        parts = node.text.parts if node.text is not None else ()
-        parts = tuple(p if isinstance(p, str) else replace(p, ref=refs.pop(p.id, None)) for p in parts)
+        node = node.with_references(lambda sync: refs.pop(sync.id, None))
         # Marks that only a description names follow the text.
-        parts += tuple(Sync(id=mark, ref=ref) for mark, ref in refs.items())
+        others = (Sync(id=mark, ref=ref) for mark, ref in refs.items())
+        parts = (*(node.text.parts if node.text is not None else ()), *others)
         return replace(node, text=SpeechText(parts=parts) if parts else node.text)
     if isinstance(node, FaceKeyframe):
         return replace(node, interpolator=None)  # thousands of numbers that no client needs in feedback

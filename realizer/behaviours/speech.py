@@ -159,8 +159,7 @@ def _spoken_content(node: Speech) -> SpokenContent | None:
         f"<mark name={quoteattr(part.id)}/>" if isinstance(part, Sync) else escape(part)
         for part in node.text.parts
     ]
-    marks = tuple(part.id for part in node.text.parts if isinstance(part, Sync))
-    return SpokenContent("".join(parts), marks, node.text.language or None)
+    return SpokenContent("".join(parts), node.marked, node.text.language or None)
 
 
 def _audio_file(node: Speech) -> str | None:

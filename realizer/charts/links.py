@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from bml_schema import After, Before, Block, Constraint, Speech, Synchronize, SyncRef
+from bml_schema import After, Before, Block, Constraint, Synchronize, SyncRef
 from realizer.scheduling.timing import Schedule
 
 # An order with less room than this binds.
@@ -69,12 +69,8 @@ def links_of(
     """
     found = _Links(block, schedule, outside)
     for node in block.behaviours:
-        for sync, ref in node.syncs.items():
-            found.tie(node.id, sync, "attribute", ref)
-        if isinstance(node, Speech) and node.text is not None:
-            for mark in node.text.parts:
-                if not isinstance(mark, str) and mark.ref is not None:
-                    found.tie(node.id, mark.id, "text", mark.ref)
+        for sync, ref in node.references:
+            found.tie(node.id, sync, "attribute" if sync in node.syncs else "text", ref)
     for constraint in block.constraints:
         found.constrain(constraint)
     return found.links

@@ -91,8 +91,10 @@ class Enricher:
         shown_now = [node for node in block.behaviours if isinstance(node, Expression)] + placed
         for node in list(shown_now):
             placed += self._company(node, shown_now, names)
-        children = _replaced(block.children, speeches)
-        return replace(block, children=(*children, *placed), places={})
+        marked = block.with_children(
+            lambda node, _: speeches.get(node.id, node) if isinstance(node, Speech) else node
+        )
+        return replace(marked, children=(*marked.children, *placed), places={})
 
     def listener(self, texts: Iterable[SpokenText], block: str) -> Block:
         """Return a block of expressions for a listener to these texts."""
@@ -273,11 +275,3 @@ def _marked(parts: Sequence[str | Sync], new: Mapping[int, str]) -> tuple[str | 
         found.append(part[cut:])
         at += len(part)
     return tuple(found)
-
-
-def _replaced(children: tuple, speeches: Mapping[str, Speech]) -> Iterator:  # type: ignore[type-arg]
-    for child in children:
-        if hasattr(child, "children"):
-            yield replace(child, children=tuple(_replaced(child.children, speeches)))
-        else:
-            yield speeches.get(getattr(child, "id", None) or "", child)
