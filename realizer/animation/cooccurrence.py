@@ -13,7 +13,7 @@ from operator import itemgetter
 
 import numpy as np
 
-from realizer.animation.axis import AU_NAMES
+from realizer.animation.axis import au
 from realizer.core.array_types import Bool, Float32, Index
 from realizer.tables.cooccurrence import Rule, Rules, Unit
 
@@ -95,17 +95,12 @@ def bounds(rules: Rules) -> Bounds:
 
 
 def _terms(chosen: list[Rule], rules: Rules) -> Terms:
-    lines = sorted(
-        (
-            row,
-            [
-                (_rows(unit.au, side), _membership(unit, rule, rules))
-                for unit in (rule.stronger[0], rule.stronger[-1])
-            ],
-        )
-        for rule in chosen
-        for row, side in _sides(rule.weaker)
-    )
+    lines = []
+    for rule in chosen:
+        for row, side in _sides(rule.weaker):
+            units = rule.stronger[0], rule.stronger[-1]
+            lines.append((row, [(_rows(u.au, side), _membership(u, rule, rules)) for u in units]))
+    lines.sort()
     distinct = list(dict.fromkeys(member for _, pair in lines for member in pair))
     terms = {
         row: [tuple(map(distinct.index, pair)) for _, pair in own]
@@ -135,10 +130,7 @@ def _membership(unit: Unit, rule: Rule, rules: Rules) -> tuple[float, float, flo
 
 def _sides(number: int) -> list[tuple[int, str]]:
     """Return (row, side) for each side of an AU; side is "" if it has a single row."""
-    names = AU_NAMES()
-    if str(number) in names:
-        return [(names.index(str(number)), "")]
-    return [(names.index(f"{number}{side}"), side) for side in "LR"]
+    return [(target.column, target.name.lstrip("0123456789")) for target in au(number)]
 
 
 def _rows(number: int, side: str) -> tuple[int, int]:
