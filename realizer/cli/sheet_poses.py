@@ -24,8 +24,7 @@ from realizer.render.difference_image import MAX_DIFFERENCE, difference, faint, 
 from realizer.render.light import preset
 from realizer.render.renderer import Renderer
 from realizer.tables import Fap, by_number, faps, regions
-from realizer.tables.emotions import archetypes, ring
-from realizer.tables.lexemes import face_lexemes
+from realizer.tables.emotions import emotion_faces, ring
 
 SCALE = (260, 16)  # pixels of the scale of colours
 HALF, TURN = 512, 34907  # half of the unit distance (Paul 2010, 4.4.2), and 20 degrees for rotations
@@ -110,12 +109,10 @@ def of_aus(intensity: float) -> list[Series]:
 def of_emotions() -> list[Series]:
     """Return the archetypes, and the wheel at 17 angles and 4 activations (Paul 2010, 6.4)."""
     poses = [
-        _pose(
-            face_lexemes()[emotion.name].aus,
-            emotion.name.lower(),
-            f"{emotion.angle:g} degrees, activation {emotion.activation:g}",
-        )
-        for emotion in archetypes()
+        _pose(face.aus, face.lexeme.lower(), f"{place.angle:g} degrees, activation {place.activation:g}")
+        for place in ring("plutchik").values()
+        if place.activation is not None
+        for face in [emotion_faces()[place.name]]
     ]
     names = {place.angle: name for name, place in ring("paul").items()}
     grid = [

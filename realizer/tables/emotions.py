@@ -74,15 +74,6 @@ class EmotionFace:
     aus: Mapping[tuple[int, str], float]
 
 
-@dataclass(frozen=True, slots=True)
-class Archetype:
-    """An emotion with a face lexeme of this name, its angle on Plutchik's ring, and activation 1..7."""
-
-    name: str
-    angle: float
-    activation: float
-
-
 @cache
 def emotion_faces() -> Mapping[str, EmotionFace]:
     """Return lower-case emotion -> face."""
@@ -92,16 +83,6 @@ def emotion_faces() -> Mapping[str, EmotionFace]:
         aus = face_lexemes()[lexeme].aus if lexeme else read_aus(row["aus"], f"{FILE}, face.{emotion}")
         found[emotion] = EmotionFace(emotion, lexeme, aus)
     return found
-
-
-@cache
-def archetypes() -> tuple[Archetype, ...]:
-    """Return the emotions with a lexeme, by angle."""
-    return tuple(
-        Archetype(emotion_faces()[place.name].lexeme, place.angle, place.activation)
-        for place in ring("plutchik").values()
-        if place.activation is not None
-    )
 
 
 @dataclass(frozen=True, slots=True)

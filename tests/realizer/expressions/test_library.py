@@ -5,7 +5,7 @@ import pytest
 from realizer.core.errors import TableError
 from realizer.expressions.expression import key
 from realizer.expressions.library import ExpressionWords, builtin, expression_words, library_of
-from realizer.tables.emotions import archetypes
+from realizer.tables.emotions import emotion_faces
 from realizer.tables.templates import templates
 from tests.rows import each_row
 
@@ -37,7 +37,7 @@ def test_builtin_has_every_expression_with_words() -> None:
 
 def test_builtin_has_templates_and_the_six_emotions() -> None:
     assert {f"template:{name.lower()}" for name in templates()} <= set(builtin())
-    assert {emotion.name for emotion in archetypes()} <= set(builtin())
+    assert {face.lexeme for face in emotion_faces().values()} - {""} <= set(builtin())
 
 
 @pytest.mark.parametrize("template", templates().values(), ids=lambda one: one.name)

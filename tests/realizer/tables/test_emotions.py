@@ -8,7 +8,6 @@ import pytest
 from realizer.emotions.wheel import wheel
 from realizer.tables import toml_table
 from realizer.tables.emotions import (
-    archetypes,
     emotion_faces,
     emotion_model,
     own_ranges,
@@ -62,10 +61,11 @@ def test_own_words_stand_for_known_words_and_hide_none() -> None:
     assert not set(own_words()) & known
 
 
-def test_archetypes_have_the_order_of_plutchik() -> None:
-    names = [archetype.name for archetype in archetypes()]
+def test_ring_of_plutchik_has_the_archetypes_in_his_order() -> None:
+    rated = [place for place in ring("plutchik").values() if place.activation is not None]
+    names = [emotion_faces()[place.name].lexeme for place in rated]
     assert names == ["FEAR", "SADNESS", "SURPRISE", "DISGUST", "ANGER", "HAPPINESS"]
-    angles = [archetype.angle for archetype in archetypes()]
+    angles = [place.angle for place in rated]
     assert angles == sorted(set(angles))
 
 
