@@ -4,6 +4,8 @@ import codecs
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
 from itertools import count, islice
 from typing import Any
 
@@ -216,21 +218,15 @@ def _begins(data: bytes) -> dict[tuple[int, str], int]:
     return begins
 
 
+@dataclass
 class _Reader:
-    """Reads the documents of one text, as BML 1.0 or as a dialect of it.
+    """Reads the documents of one text, as BML 1.0 or as a dialect of it."""
 
-    Attributes:
-        wrapper: local name of the element around the documents, or "".
-    """
-
-    def __init__(
-        self, vocabulary: Vocabulary, max_behaviours: int, strict_bml: bool, block_ids: Iterator[str]
-    ) -> None:
-        self.vocabulary = vocabulary
-        self.max_behaviours = max_behaviours
-        self.strict_bml = strict_bml
-        self.block_ids = block_ids
-        self.wrapper = ""
+    vocabulary: Vocabulary
+    max_behaviours: int
+    strict_bml: bool
+    block_ids: Iterator[str]
+    wrapper: str = ""  # local name of the element around the documents
 
     def read(
         self,
@@ -241,25 +237,22 @@ class _Reader:
         notes: tuple[str, ...] = (),
     ) -> Block:
         """Read the block of a <bml> element; raise BMLError if there is none."""
-
-        def block(notes: tuple[str, ...]) -> Block:
-            return read_block(
-                root,
-                self.vocabulary,
-                lines_before=lines_before,
-                begins=begins,
-                max_behaviours=self.max_behaviours,
-                lenient=not self.strict_bml,
-                notes=notes,
-            )
-
+        block = partial(
+            read_block,
+            root,
+            self.vocabulary,
+            lines_before=lines_before,
+            begins=begins,
+            max_behaviours=self.max_behaviours,
+            lenient=not self.strict_bml,
+        )
         if self.strict_bml:
             return self._read_strictly(root, block)
         plain: Block | BMLError | None = None
         if not self.wrapper and not is_draft(root):
             # Nearly all documents are BML 1.0. Others have faults, or words that occur in dialects only.
             try:
-                plain = block(notes)
+                plain = block(notes=notes)
             except BMLError as error:
                 plain = error
             if isinstance(plain, Block) and not plain.problems and not has_words_of_dialects(plain):
@@ -271,15 +264,14 @@ class _Reader:
             any_node: Any = node
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
-        begins = {}
         report = translate(root, self.wrapper, self.block_ids)
         if report or plain is None:
-            return block((*notes, report.text) if report else notes)
+            return block(begins={}, notes=(*notes, report.text) if report else notes)
         if isinstance(plain, BMLError):
             raise plain
         return plain
 
-    def _read_strictly(self, root: etree._Element, block: Callable[[tuple[str, ...]], Block]) -> Block:
+    def _read_strictly(self, root: etree._Element, block: Callable[..., Block]) -> Block:
         """Read BML 1.0 only; if there are faults, say of which dialect they are words."""
 
         def dialect() -> str:
@@ -288,14 +280,14 @@ class _Reader:
             return dialect_of(root, self.wrapper)
 
         try:
-            plain = block(())
+            plain = block()
         except BMLError as error:
             if name := dialect():
                 text = f"{error.text}; {_NOT_READ.format(name)}"
                 raise type(error)(text, line=error.line, path=error.path, block=error.block) from None
             raise
         if plain.problems and (name := dialect()):
-            return block((_NOT_READ.format(name),))
+            return block(notes=(_NOT_READ.format(name),))
         return plain
 
 

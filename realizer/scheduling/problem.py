@@ -287,17 +287,14 @@ def _add_constraint(
             problem.faults.append((part, str(fault)))
 
 
+@dataclass(slots=True, eq=False)
 class _ReferenceResolver:
     """Maps sync references of one member to (point, seconds after it)."""
 
-    def __init__(
-        self,
-        member: Member,
-        members: Mapping[str, Member],
-        first: Mapping[tuple[str, str], int],
-        outside: Callable[[SyncRef], float | None],
-    ) -> None:
-        self.member, self.members, self.first, self.outside = member, members, first, outside
+    member: Member
+    members: Mapping[str, Member]
+    first: Mapping[tuple[str, str], int]
+    outside: Callable[[SyncRef], float | None]
 
     def is_own(self, ref: SyncRef) -> bool:
         return ref.block is None or ref.block == self.member.block.id
@@ -327,11 +324,9 @@ class _ReferenceResolver:
         is_own = self.is_own(ref)
         if member is None or (name == "bml" and not is_own):
             return ORIGIN, self.external_time(ref) + late
-        if name is None:
-            return ORIGIN, member.start + ref.offset
-        if name == "bml":
-            if ref.sync != "start":
-                raise LookupError(f"{ref}: of its own block only bml:start can be referred to")
+        if name == "bml" and ref.sync != "start":
+            raise LookupError(f"{ref}: of its own block only bml:start can be referred to")
+        if name is None or name == "bml":
             return ORIGIN, member.start + ref.offset
         first = self.first.get((member.block.id, name))
         if first is None:
