@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from bml_schema import After, Before, Synchronize
+from bml_schema import After, Before, Behaviour, Block, Constraint, Synchronize, SyncRef
 from realizer.core import work
 from realizer.scheduling.timing import Timing
-
-if TYPE_CHECKING:
-    from bml_schema import Behaviour, Block, Constraint, SyncRef
 
 # The point of the block's start; it is at 0 and every number is tied to it.
 ORIGIN = 0

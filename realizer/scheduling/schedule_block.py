@@ -1,12 +1,11 @@
 """Scheduling of blocks: solve, drop parts in conflicts, and solve the rest again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from bml_schema import SyncRef
 from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import choose, fault_warning, refusal, warning_of
@@ -15,9 +14,6 @@ from realizer.scheduling.model import TIGHT
 from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Warning
-
-if TYPE_CHECKING:
-    from bml_schema import SyncRef
 
 # Behaviours may begin so much earlier where it is asked how late they are.
 LONG_AGO = 1e6  # s
