@@ -74,8 +74,7 @@ def _time(ref: SyncRef, times: Mapping[str, Mapping[str, float]]) -> float | Non
         return None
     if ref.behaviour is None or ref.behaviour == "bml":
         return ref.offset
-    point = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
-    time = times.get(ref.behaviour, {}).get(point or "")
+    time = times.get(ref.behaviour, {}).get(ref.point)
     return None if time is None else time + ref.offset
 
 

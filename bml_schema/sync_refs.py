@@ -28,12 +28,15 @@ class SyncRef:
     index: int | None = None  # n of "stroke:n", counted from 1, or None
     offset: float = 0.0  # seconds after that point; for a plain number, seconds after block start
 
+    @property
+    def point(self) -> str:
+        """The sync point with its index, such as "stroke:2"; "" if the reference is a number."""
+        return f"{self.sync}:{self.index}" if self.index is not None else self.sync or ""
+
     def __str__(self) -> str:
         if self.behaviour is None or self.sync is None:
             return decimal(self.offset)
-        point = ":".join(filter(None, (self.block, self.behaviour, self.sync)))
-        if self.index is not None:
-            point = f"{point}:{self.index}"
+        point = ":".join(filter(None, (self.block, self.behaviour, self.point)))
         # Blanks around the sign, because ids may hold hyphens; "+ 0" if the name ends like an offset.
         if self.offset or _OFFSET_LIKE.fullmatch(point):
             point += f" {'-' if self.offset < 0 else '+'} {decimal(abs(self.offset))}"

@@ -103,7 +103,7 @@ class _Links:
                 begin, end = self._time(first), self._time(last)
                 slack = None if begin is None or end is None else end - begin
             link = Link(
-                _sync(here),
+                here.point,
                 kind,
                 *self._other(there),
                 there.offset - here.offset,
@@ -130,7 +130,7 @@ class _Links:
         own = ref.block in (None, self.block.id)
         if ref.behaviour is None or (own and ref.behaviour == "bml"):
             return None, None, None
-        return (None if own else ref.block), ref.behaviour, _sync(ref)
+        return (None if own else ref.block), ref.behaviour, ref.point
 
     def _time(self, ref: SyncRef) -> float | None:
         """Return the seconds from block start, the offset included."""
@@ -139,13 +139,9 @@ class _Links:
         if ref.behaviour in (None, "bml"):
             return ref.offset
         try:
-            return self.schedule.at(ref.behaviour or "", _sync(ref)) + ref.offset
+            return self.schedule.at(ref.behaviour or "", ref.point) + ref.offset
         except KeyError:
             return None
-
-
-def _sync(ref: SyncRef) -> str:
-    return f"{ref.sync}:{ref.index}" if ref.index is not None else ref.sync or ""
 
 
 def _pairs(constraint: Constraint) -> Iterator[tuple[str, SyncRef, SyncRef]]:

@@ -328,8 +328,7 @@ class _ReferenceResolver:
         first = self.first.get((member.block.id, name))
         if first is None:
             return None if is_own else (ORIGIN, self.external_time(ref) + late)
-        sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
         points = member.timings[name].points
-        if sync not in points:
-            raise LookupError(f"{ref}: {name} has no {sync}, only {', '.join(points)}")
-        return first + points.index(sync), ref.offset + (0.0 if is_own else late)
+        if ref.point not in points:
+            raise LookupError(f"{ref}: {name} has no {ref.point}, only {', '.join(points)}")
+        return first + points.index(ref.point), ref.offset + (0.0 if is_own else late)
