@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bml_schema import Behaviour
+from bml_schema.node_schema import local
 from realizer.animation.axis import AU_NAMES
 from realizer.charts.chart_data import charts_of
 from realizer.charts.panels import Panel, panels
@@ -112,7 +112,7 @@ def _nodes(active: ActiveBlock) -> Iterator[str]:
     yield f"{block.id}: {len(block.behaviours)} behaviours, {len(block.constraints)} constraints"
     for node in block.behaviours:
         syncs = "".join(f' {name}="{ref}"' for name, ref in node.syncs.items())
-        yield f"  {_tag(node)} {node.id}{syncs}"
+        yield f"  {local(node.tag)} {node.id}{syncs}"
     yield from (f"  dropped: {problem}" for problem in block.problems)
 
 
@@ -187,7 +187,3 @@ def _frames(played: Realization) -> list[str]:
 def _shown_at(played: Realization) -> float:
     """Return the time of the frame whose action units are the strongest in all."""
     return float(np.asarray(played.aus.aus).sum(axis=1).argmax() / played.fps)
-
-
-def _tag(node: Behaviour) -> str:
-    return node.tag.rpartition("}")[2]

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterable
 
 from bml_schema import Behaviour, Block, Place
+from bml_schema.node_schema import local
 from realizer.charts.links import Link, links_of
 from realizer.charts.timeline import BehaviourRow, BlockChart, Dropped, Gap, Point, WordSpan
 from realizer.playback.active_block import ActiveBlock
@@ -65,7 +66,7 @@ def _behaviour_row(
     )
     return BehaviourRow(
         node.id,
-        node.tag.rpartition("}")[2],
+        local(node.tag),
         _element(playing.block.places.get(node.id))[1],
         node.id in playing.block.required,
         points,
@@ -121,7 +122,7 @@ def _cut(playing: ActiveBlock, id: str) -> Dropped:
     when = "" if playing.stopped_at is None else f" at {playing.stopped_at:.3f} s"
     # A block that waited is without it by now.
     tag = next((node.tag for node in playing.block.behaviours if node.id == id), None)
-    element = element if tag is None else tag.rpartition("}")[2]
+    element = element if tag is None else local(tag)
     return Dropped(id, element, line, playing.state.value, f"cut off{when}, before it began")
 
 
