@@ -46,7 +46,7 @@ _PARTS: Mapping[str, type[Synchronize | Before | After]] = {c.tag: c for c in (S
 _IN_BMLA = f"{{{BMLA}}}"
 _SYNC, _DESCRIPTION = Sync.tag, Description.tag
 # Elements of the core that are not behaviours.
-_INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
+INNER = {c.tag for c in (Block, Required, Constraint, Description, SpeechText, Sync, *_PARTS.values())}
 
 
 @lru_cache(maxsize=1000)
@@ -79,7 +79,7 @@ class ElementReader:
     def tag(self, element: etree._Element) -> str:
         """Return the Clark tag; elements without namespace, or of a draft, are core or extension elements."""
         raw: Any = element.tag
-        if raw in _INNER or raw in self.vocabulary:
+        if raw in INNER or raw in self.vocabulary:
             return cast("str", raw)
         known, elsewhere = _standard(raw)
         if elsewhere not in self.vocabulary or known in self.vocabulary:

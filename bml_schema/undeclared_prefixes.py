@@ -5,32 +5,16 @@ from typing import Any
 
 from lxml import etree
 
-from bml_schema.behaviours import Sync
 from bml_schema.canonical import MAX_ATTRIBUTES, xml_parser
+from bml_schema.element_reader import INNER
 from bml_schema.node_schema import local, schema_of
-from bml_schema.nodes import (
-    BMLA,
-    BMLT,
-    NAMESPACES,
-    OWN,
-    After,
-    Before,
-    Behaviour,
-    Block,
-    Constraint,
-    Description,
-    Required,
-    Synchronize,
-    core,
-    extension,
-)
+from bml_schema.nodes import NAMESPACES, Behaviour, Block, bmla, bmlt, core, extension, own
 
 SMARTBODY = "http://ict.usc.edu"
 GRETA = "gretaNameSpace"
 # The namespaces that documents mean by these prefixes.
 _MEANT = NAMESPACES | {"sbm": SMARTBODY, "greta": GRETA}
-# Elements of BML that are no behaviours, nor children that their classes name.
-_INNER = {local(c.tag) for c in (Required, Constraint, Synchronize, Before, After, Description, Sync)}
+_INNER = {local(tag) for tag in INNER}
 
 
 def read_undeclared(
@@ -69,7 +53,7 @@ def read_undeclared(
                 name in _INNER or any(name in schema_of(c).by_local for c in vocabulary.values())
             ):
                 tag = name
-            if tag is None and local(element.getparent().tag) in ("bml", local(Required.tag)):
+            if tag is None and local(element.getparent().tag) in ("bml", "required"):
                 element.tag = name  # an unknown behaviour, of which its own warning says so
                 continue
             prefixes[prefix] = None
@@ -89,9 +73,7 @@ def read_undeclared(
 def _tags(prefix: str, name: str) -> Iterator[str]:
     if prefix in _MEANT:
         yield f"{{{_MEANT[prefix]}}}{name}"
-    yield core(name)
-    yield extension(name)
-    yield from (f"{{{space}}}{name}" for space in (BMLA, BMLT, OWN))
+    yield from (namespace(name) for namespace in (core, extension, bmla, bmlt, own))
 
 
 def _rename_attributes(
