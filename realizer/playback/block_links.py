@@ -114,9 +114,8 @@ def _time(ref: SyncRef, schedule: Schedule) -> float | None:
     """Return the seconds from block start of a reference, or None."""
     if ref.behaviour == "bml":
         return {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
-    sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
-        return schedule.at(ref.behaviour or "", sync or "")
+        return schedule.at(ref.behaviour or "", ref.point)
     except KeyError:
         return None
 
@@ -186,9 +185,8 @@ def affected_blocks(
 
 def _has_passed(ref: SyncRef, playing: ActiveBlock, now: float) -> bool:
     """Return whether a point has passed or does not exist."""
-    sync = ref.sync if ref.index is None else f"{ref.sync}:{ref.index}"
     try:
-        time = playing.schedule.at(ref.behaviour or "", sync or "")
+        time = playing.schedule.at(ref.behaviour or "", ref.point)
     except KeyError:
         return True
     return playing.start + time <= now

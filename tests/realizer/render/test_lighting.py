@@ -32,6 +32,8 @@ def test_reach_is_dark_behind_and_light_before():
     assert at(left, -0.9) < 0.01
     assert at(left, 0.9) == pytest.approx(1)
     assert at(-left, -0.9) == pytest.approx(1, abs=0.01)
+    top, bottom = view.project(np.float32([[left, 1, 0], [left, -1, 0]]))[:, 2]
+    assert at(left, 1 - 2 * (0.3 - top) / (bottom - top)) == pytest.approx(1), "it does not shade itself"
     edge = [at(x, -0.9) for x in np.linspace(left / 20, -left / 20, 41)]
     assert (np.diff(edge) >= -1e-3).all()
     assert any(0.2 < share < 0.8 for share in edge)
