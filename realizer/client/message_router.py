@@ -1,7 +1,5 @@
 """The router of the service's messages to queues, answers, listeners and receivers; it has no sockets."""
 
-from __future__ import annotations
-
 import json
 import logging
 import math
@@ -10,7 +8,7 @@ import time
 from collections import deque
 from dataclasses import replace
 from html import unescape
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
 from realizer.core.errors import RealizerError
@@ -40,7 +38,7 @@ class ClientError(RealizerError):
         self.code = code
 
     @classmethod
-    def of(cls, error: dict[str, Any]) -> ClientError:
+    def of(cls, error: dict[str, Any]) -> Self:
         """Return the exception for a message `error`."""
         return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
 

@@ -1,20 +1,16 @@
 """The parser of control messages."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING, Annotated, get_args
+from typing import Annotated, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import Control
 from realizer.protocol.streams import STREAMS
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 SUPPORTED: tuple[str, ...] = tuple(
     get_args(model.model_fields["type"].annotation)[0] for model in get_args(Control)

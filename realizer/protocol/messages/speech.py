@@ -1,9 +1,7 @@
 """The message `speech`: text chunk by chunk, or annotations of a sound clip."""
 
-from __future__ import annotations
-
 import re
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import AliasChoices, Field, field_validator, model_validator
 
@@ -71,7 +69,7 @@ class SpeechMessage(Message):
     final: bool = Field(True, description="whether the description of the clip is complete")
 
     @model_validator(mode="after")
-    def _whole(self) -> SpeechMessage:
+    def _whole(self) -> Self:
         if self.id is None and self.clip is None:
             raise ValueError("wanted the id of a speech, or a clip")
         if self.id is None and (self.append is not None or self.close):

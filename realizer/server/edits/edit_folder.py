@@ -1,23 +1,19 @@
 """The folder in which clients save files: which kinds, whole, and never over somebody else's change."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from realizer.core.atomic_files import lock, write_bytes
 from realizer.core.errors import RealizerError
+from realizer.expressions.user_expressions import check_file
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage, Saved
-
-if TYPE_CHECKING:
-    from realizer.server.session.effects import Write
-
+from realizer.server.session.effects import Write
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 SUFFIX = re.compile(r"\.[a-z0-9]{1,8}")
@@ -137,10 +133,4 @@ def _content(text: str, encoding: str) -> bytes:
         raise EditError("content: wanted base64") from None
 
 
-def _check_expression(path: Path, content: bytes) -> None:
-    from realizer.expressions.user_expressions import check_file
-
-    check_file(path, content)
-
-
-KINDS = {"expression": Kind("expressions", ".toml", _check_expression)}
+KINDS = {"expression": Kind("expressions", ".toml", check_file)}

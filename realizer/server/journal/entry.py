@@ -1,12 +1,10 @@
 """Journal entries, saved sessions and the protocols of journals and recorders."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, Protocol, Self, get_args
 
 from realizer.core.errors import RealizerError
 
@@ -52,7 +50,7 @@ class Entry:
         return json.dumps(data, ensure_ascii=False)
 
     @classmethod
-    def read(cls, line: str) -> Entry:
+    def read(cls, line: str) -> Self:
         """Parse a line that `line` returned.
 
         Raises:
@@ -92,7 +90,7 @@ class SavedSession:
         parts: Mapping[str, str],
         head: Mapping[str, Any] | None = None,
         place: str = "the journal:",
-    ) -> SavedSession:
+    ) -> Self:
         """Parse the stored lines of a session.
 
         Args:
