@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from realizer.animation.axis import au, axis, fap
+from realizer.animation.axis import au_row, axis, fap
 from realizer.animation.fap.conversion import FapMapping
 from realizer.animation.frames import AUFrames
 from realizer.animation.pose import poses as poses_of
@@ -58,7 +58,7 @@ def frames(series: Sequence[Series]) -> AUFrames:
 
 def neutral() -> Series:
     """Return the face at rest, with which all others are compared."""
-    return Series("", [Pose(_nothing(), "neutral")])
+    return Series("", [Pose(_faps({}), "neutral")])
 
 
 def of_faps(value: float) -> list[Series]:
@@ -132,21 +132,14 @@ def of_emotions() -> list[Series]:
 
 def _pose(aus: Mapping[tuple[int, str], float], title: str, note: str) -> Pose:
     """Return a pose of action units, (AU, side) -> intensity."""
-    row = _nothing()
-    for (number, side), amount in aus.items():
-        row[[target.column for target in au(number, side)]] = amount
-    return Pose(row, title, (note,))
+    return Pose(au_row(aus), title, (note,))
 
 
 def _faps(values: Mapping[int, float]) -> Float32:
-    row = _nothing()
+    row = np.zeros(len(axis()), np.float32)
     for number, value in values.items():
         row[fap(number).column] = value
     return row
-
-
-def _nothing() -> Float32:
-    return np.zeros(len(axis()), np.float32)
 
 
 def draw(
