@@ -71,8 +71,6 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     try:
         status = cli(arguments, standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
-    except click.exceptions.Exit as end:
-        sys.exit(end.exit_code)
     except click.Abort:
         sys.exit(130)
     except click.ClickException as error:

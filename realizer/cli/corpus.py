@@ -1,5 +1,6 @@
 """`corpus`: recordings of people become labelled segments, statistics, rules and profiles."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -7,11 +8,13 @@ from typing import Any, TypeAlias
 import click
 
 from realizer.cli import inputs, options
+from realizer.cli.edit_face import serve_tab
 from realizer.cli.marker_options import follow as follow_markers
 from realizer.cli.marker_options import look_of, marker_options
 from realizer.cli.options import option
 from realizer.cli.progress import note
 from realizer.cli.track import follow as follow_faces
+from realizer.core.settings import Settings
 
 folder = click.argument("folder", metavar="DIR", type=options.FOLDER)
 SEGMENT = (click.FLOAT, click.FLOAT, click.STRING)
@@ -66,8 +69,6 @@ def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     words of `realizer align`). A tier `words` or `words SPEAKER` has words; any other has the labels of the
     annotator of its name.
     """
-    import shutil
-
     from realizer.core.atomic_files import replacing
     from realizer.corpus import recording as recordings
     from realizer.corpus.films import is_film
@@ -154,9 +155,6 @@ def label(folder: Path, name: str | None, annotator: str, **chosen: Any) -> None
     and go out by `realizer corpus export`.
     """
     import asyncio
-
-    from realizer.cli.edit_face import serve_tab
-    from realizer.core.settings import Settings
 
     _check_corpus(folder)
     if chosen["page"]:

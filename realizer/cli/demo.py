@@ -11,6 +11,8 @@ import click
 from realizer.cli import options
 from realizer.cli.options import option
 from realizer.cli.progress import steps, warn_no_voice
+from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
 
 if TYPE_CHECKING:
     from bml_schema import Feedback
@@ -46,7 +48,6 @@ def demo(once: bool, port: int, voice: str | None, face: str) -> None:
 
 def _film(documents: list[str], voice: str | None, face: str) -> None:
     """Write all examples, one after the other, to demo.fap and demo.mp4."""
-    from realizer.core.errors import RealizerError
     from realizer.offline import realize
     from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import output_for
@@ -84,7 +85,6 @@ def _line(feedback: Feedback) -> str:
 async def _serve(documents: dict[str, str], once: bool, port: int, voice: str | None, face: str) -> None:
     """Serve the page, play every example as a client would, and print its feedback."""
     from realizer.client import connect
-    from realizer.core.settings import Settings
     from realizer.server.serve import Server
 
     settings = Settings.read({"port": port, "voice": voice, "face": face})

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from importlib.util import find_spec
 
 import click
@@ -91,8 +92,6 @@ def _faces() -> Iterator[Finding]:
 
 
 def _page() -> Iterator[Finding]:
-    from importlib.resources import files
-
     works = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
     yield works, "page", "served at http://HOST:PORT/" if works else fix

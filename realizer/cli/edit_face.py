@@ -1,16 +1,13 @@
 """`faces edit`: opens the page's Face tab on a copy of a face."""
 
-from __future__ import annotations
-
+import os
+import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from realizer.cli.options import completing_faces, option
-
-if TYPE_CHECKING:
-    from realizer.core.settings import Settings
+from realizer.core.settings import Settings
 
 
 @click.command("edit")
@@ -35,10 +32,7 @@ def edit_face(name: str, folder: Path, port: int, browser: bool) -> None:
     realizer realize hello.bml -o hello.mp4 --face edited/faces/ada
     """
     import asyncio
-    import os
-    import shutil
 
-    from realizer.core.settings import Settings
     from realizer.face.load import VARIABLE, folder_of
 
     source = folder_of(name)

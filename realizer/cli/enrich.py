@@ -14,6 +14,7 @@ import click
 from realizer.cli import inputs, options
 from realizer.cli.options import option
 from realizer.cli.progress import is_quiet, note
+from realizer.core.errors import TableError
 
 if TYPE_CHECKING:
     from realizer.knowledge.word_languages import Words
@@ -57,7 +58,6 @@ words = option(
 
 def words_for(language: str | None, file: Path | None) -> Words:
     """Return the emotional words to use."""
-    from realizer.core.errors import TableError
     from realizer.knowledge.word_languages import Words
     from realizer.tables.emotional_words import words_of
 
@@ -79,7 +79,6 @@ def warn_unknown_languages(words: Words, languages: Iterable[str], warned: set[s
 
 def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | None]:
     """Return the rules and templates in a folder of `realizer corpus describe`, or ours and None."""
-    from realizer.core.errors import TableError
     from realizer.tables import knowledge, templates
 
     if folder is None:

@@ -13,6 +13,8 @@ import click
 from realizer.cli import inputs, options
 from realizer.cli.options import option
 from realizer.cli.progress import note
+from realizer.cli.track import follow
+from realizer.core.errors import TableError
 
 if TYPE_CHECKING:
     from realizer.expressions.expression import Expression
@@ -30,7 +32,6 @@ class ActionUnits(click.ParamType):  # type: ignore[type-arg]
     name = "action units"
 
     def convert(self, value: Any, parameter: click.Parameter | None, context: click.Context | None) -> Any:
-        from realizer.core.errors import TableError
         from realizer.tables.lexemes import read_aus
 
         units: dict[tuple[int, str], float] = {}
@@ -139,7 +140,6 @@ def _like(
 
 def _tracked(path: Path, library: Sequence[Expression]) -> list[tuple[Expression, float]]:
     """Return the expressions with the action units that are tracked in a picture, best match first."""
-    from realizer.cli.track import follow
     from realizer.expressions.search import by_action_units
     from realizer.tables.lexemes import read_aus
     from realizer.tracking.network import TrackingError

@@ -13,6 +13,7 @@ from realizer.cli import inputs, options
 from realizer.cli.options import option
 from realizer.cli.progress import note
 from realizer.cli.realize import output_options, play_documents
+from realizer.core.errors import RealizerError
 
 if TYPE_CHECKING:
     from realizer.animation.fap.fap_clip import FAPClip
@@ -124,7 +125,6 @@ def play(file: str, **flags: Any) -> int:
     from bml_schema.documents import MAX_BYTES
     from realizer.behaviours.fap_visemes import expand_compound
     from realizer.behaviours.keyframes import document_of
-    from realizer.core.errors import RealizerError
 
     clip = expand_compound(_read(file))
     _print_notes(file, clip)
@@ -147,7 +147,6 @@ def play(file: str, **flags: Any) -> int:
 
 
 def _read(file: str) -> FAPClip:
-    from realizer.core.errors import RealizerError
     from realizer.outputs.fap_clip_files import read_clip
 
     content = inputs.read_file(file)

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from realizer.core.options import PlayOptions
+from realizer.core.settings import Settings, SettingsError
+
 if TYPE_CHECKING:  # importing them takes longer than `--help` should
     from realizer.behaviours.kind import Position
-    from realizer.core.settings import Settings
     from realizer.playback.player import Player
 
 DISK_FULL = (errno.ENOSPC, errno.EFBIG)
@@ -50,16 +52,12 @@ def opening(path: str | Path) -> Iterator[None]:
 
 def settings(**flags: Any) -> Settings:
     """Return the settings from flags, REALIZER_* variables and defaults."""
-    from realizer.core.settings import Settings, SettingsError
-
     with reporting(SettingsError):
         return Settings.read(flags)
 
 
 def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
     """Return the settings for playing from the options of a command and further flags."""
-    from realizer.core.options import PlayOptions
-
     names = {"voice", *(f.name for f in fields(PlayOptions) if f.name != "idle")}
     flags |= {name: options[name] for name in names if name in options}
     return settings(**flags, idle=False if options["no_idle"] else None)
@@ -67,7 +65,6 @@ def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
 
 def planning_player(chosen: Settings, scene: Path | None) -> Player:
     """Return a player for schedules only, with the targets of a scene file."""
-    from realizer.core.options import PlayOptions
     from realizer.playback.player import Player
 
     names = ("language", "media", "expressions", "strict_bml")

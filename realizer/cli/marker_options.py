@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -65,8 +66,6 @@ def look_of(source: Path, chosen: dict[str, Any], neutral: int | None) -> Look |
     Raises:
         TrackingError: values that cannot be used.
     """
-    from itertools import islice
-
     from realizer.tracking.markers import colours
     from realizer.tracking.markers.film import Look
     from realizer.tracking.markers.layout import read_layout

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from realizer.cli.inputs import bad, reporting
+from realizer.core.errors import FaceError, RenderError
 
 Decorator = Callable[[Any], Any]
 
@@ -109,7 +110,6 @@ def parse_size(context: click.Context, parameter: click.Parameter, value: str) -
 
 def check_face(name: str | None) -> str | None:
     """Return a face that is there, by name or path; the error lists those that are."""
-    from realizer.core.errors import FaceError
     from realizer.face.load import folder_of
 
     with reporting(FaceError, wrong=bad("--face")):
@@ -122,7 +122,6 @@ def check_face(name: str | None) -> str | None:
 
 def check_light(name: str | None) -> str | None:
     """Return the name of a light; the error lists those that are there."""
-    from realizer.core.errors import RenderError
     from realizer.render.light import preset
 
     with reporting(RenderError, wrong=click.BadParameter):
@@ -133,7 +132,6 @@ def check_light(name: str | None) -> str | None:
 
 def check_camera(face: str, name: str) -> None:
     """Check that a face has a camera of this name; the error lists those it has."""
-    from realizer.core.errors import RenderError
     from realizer.face.load import load_face
     from realizer.render.cameras import PRESETS, camera_for
 
@@ -143,7 +141,6 @@ def check_camera(face: str, name: str) -> None:
 
 
 def _background(context: click.Context, parameter: click.Parameter, value: str | None) -> str | None:
-    from realizer.core.errors import RenderError
     from realizer.render.backdrop import background_of, is_picture, read_picture
 
     with reporting(RenderError, wrong=click.BadParameter):

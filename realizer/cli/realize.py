@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -16,8 +17,6 @@ from realizer.cli.options import option
 from realizer.cli.progress import note, print_warnings, steps, warn_no_voice
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
     from realizer.outputs.output import Output, RenderSettings
     from realizer.realization import Realization
     from realizer.scheduling.timing import Schedule

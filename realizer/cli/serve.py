@@ -10,7 +10,7 @@ import click
 from realizer.cli import inputs, options
 from realizer.cli.options import option
 from realizer.cli.progress import warn_no_voice
-from realizer.core.settings import Settings
+from realizer.core.settings import Settings, SettingsError
 
 LIMITS = tuple(f.name for f in fields(Settings) if f.name.startswith("max_"))
 
@@ -107,7 +107,6 @@ def serve(config: Path | None, **flags: Any) -> None:
     Prints the address of each transport when it is ready; the page is at http://HOST:PORT/. On SIGINT or
     SIGTERM the service takes no more work, lets blocks play for up to 5 s, and exits.
     """
-    from realizer.core.settings import SettingsError
     from realizer.server.serve import run
     from realizer.server.serve import serve as run_service
     from realizer.speech.registry import find_voice

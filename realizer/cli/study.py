@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,8 +15,6 @@ from realizer.cli.options import option
 from realizer.cli.progress import counting, note
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from realizer.study.drawing import Variant
 
 # Not imported for --help.

@@ -11,6 +11,7 @@ import click
 
 from realizer.cli import inputs, options
 from realizer.cli.realize import output_options, play_documents
+from realizer.core.errors import TableError
 
 if TYPE_CHECKING:
     from realizer.expressions.library import Library
@@ -67,7 +68,6 @@ def timeline(file: Path, **flags: Any) -> int:
 
 def faults_in(content: bytes, library: Library) -> list[str]:
     """Return the faults of a timeline, each with its channel and entry."""
-    from realizer.core.errors import TableError
     from realizer.expressions.timeline import faults_of
     from realizer.expressions.timeline_file import read_timeline
 

@@ -12,6 +12,7 @@ from realizer.cli.marker_options import follow as follow_markers
 from realizer.cli.marker_options import look_of, marker_options
 from realizer.cli.options import option
 from realizer.cli.progress import bar, note
+from realizer.core.errors import FaceError
 
 if TYPE_CHECKING:
     from realizer.core.array_types import Float64
@@ -191,7 +192,6 @@ def _neutral(neutral: str, person: Person) -> Person:
 def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
     import numpy as np
 
-    from realizer.core.errors import FaceError
     from realizer.face.features import fapu_of
 
     try:
