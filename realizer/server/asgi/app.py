@@ -224,12 +224,10 @@ def event_of(message: str) -> str:
 class _Listener:
     """An `Outbound` that keeps the texts of a session for somebody who reads them."""
 
+    unsent_bytes = 0
+
     def __init__(self) -> None:
         self.messages: asyncio.Queue[str | None] = asyncio.Queue()
-
-    @property
-    def unsent_bytes(self) -> int:
-        return 0
 
     def send(self, data: str | bytes) -> None:
         if isinstance(data, str):

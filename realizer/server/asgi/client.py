@@ -26,14 +26,10 @@ class AsgiClient:
         self._most = settings.max_message
         self._warn: Callable[[str], None] = lambda notice: None
         self._queue: asyncio.Queue[str | bytes | None] = asyncio.Queue()  # None after the last message
-        self._unsent = 0
+        self.unsent_bytes = 0
         self._ending = False
         self._end: asyncio.Task[None] | None = None
         self._writing = asyncio.create_task(self._write())
-
-    @property
-    def unsent_bytes(self) -> int:
-        return self._unsent
 
     def on_rate(self, warn: Callable[[str], None]) -> None:
         self._warn = warn
@@ -41,7 +37,7 @@ class AsgiClient:
     def send(self, data: str | bytes) -> None:
         if not self._ending and self.close_code is None:
             self._queue.put_nowait(data)
-            self._unsent += len(data)
+            self.unsent_bytes += len(data)
 
     async def send_all(self, text: str | bytes) -> None:
         self.send(text)
@@ -102,5 +98,5 @@ class AsgiClient:
                     )
             except (RuntimeError, WebSocketDisconnect):
                 self.close_code = self.close_code or 1006
-            self._unsent -= len(data)
+            self.unsent_bytes -= len(data)
             self._queue.task_done()

@@ -35,8 +35,8 @@ class Hub:
         self._starting: asyncio.Task[None] | None = None
         self.sessions: SessionHost
 
-    async def ready(self) -> Hub:
-        """Return the hub when its sessions can be joined.
+    async def ready(self) -> None:
+        """Return when sessions can be joined.
 
         Raises:
             RealizerError, OSError: something that the settings name is missing.
@@ -44,7 +44,6 @@ class Hub:
         if self._starting is None:
             self._starting = asyncio.create_task(self._start())
         await asyncio.shield(self._starting)
-        return self
 
     async def _start(self) -> None:
         self.sessions = SessionHost(self.settings)

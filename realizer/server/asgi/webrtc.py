@@ -39,6 +39,7 @@ class Peer:
     """
 
     number = 0
+    unsent_bytes = 0
 
     def __init__(self, session: str, seconds_left: float | None = None) -> None:
         self.session = session
@@ -46,10 +47,6 @@ class Peer:
         self.tracks: dict[str, Any] = {}
         self.replies: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
         self.ended = asyncio.Event()
-
-    @property
-    def unsent_bytes(self) -> int:
-        return 0
 
     def send(self, data: str | bytes) -> None:
         if isinstance(data, bytes):

@@ -27,6 +27,8 @@ class AvatarTransport(ReconnectingTransport):
     whether a program receives the packets.
     """
 
+    unsent_bytes = 0  # packets do not wait for a receiver
+
     def __init__(self, name: str, peer: str, sessions: SessionHost, settings: Settings) -> None:
         super().__init__(name, peer)
         self._sessions = sessions
@@ -44,14 +46,6 @@ class AvatarTransport(ReconnectingTransport):
     def startup_lines(self) -> tuple[str, ...]:
         shown = "the oldest session with a client" if self._session is None else f"session {self._session}"
         return (f"{self._name}: {self._peer} shows {shown}",)
-
-    def stop_accepting(self) -> None:
-        """Continue, because playing blocks are shown to their end."""
-
-    @property
-    def unsent_bytes(self) -> int:
-        """Always 0, because packets do not wait for a receiver."""
-        return 0
 
     def send(self, data: str | bytes) -> None:
         if self._udp is None or not isinstance(data, str) or not data.startswith("{"):

@@ -34,6 +34,10 @@ class ReconnectingTransport(ABC):
     async def ready(self) -> None:
         await self._up.wait()
 
+    def stop_accepting(self) -> None:
+        """Go on: what plays is shown to its end, and sessions refuse documents themselves."""
+        return
+
     async def close(self) -> None:
         if self._keeper is not None:
             self._keeper.cancel()

@@ -61,7 +61,7 @@ class StompTransport(ReconnectingTransport):
         self._thread = ThreadPoolExecutor(1, "stomp")
         self._broker: BrokerConnection | None = None
         self._out: deque[Message] = deque()
-        self._size = 0  # characters in _out
+        self.unsent_bytes = 0  # characters in _out
         self._news = asyncio.Event()
         self._leaving: asyncio.Task[None] | None = None
 
@@ -73,9 +73,6 @@ class StompTransport(ReconnectingTransport):
     async def start(self) -> None:
         check_installed()
         await super().start()
-
-    def stop_accepting(self) -> None:
-        """Go on reading: the sessions answer documents with a refusal."""
 
     async def close(self) -> None:
         if self._leaving is None:
@@ -97,14 +94,10 @@ class StompTransport(ReconnectingTransport):
     def send_message(self, message: Message) -> None:
         """Send a message as soon as the broker is connected."""
         self._out.append(message)
-        self._size += len(message.body)
-        while self._size > MAX_QUEUED:
-            self._size -= len(self._out.popleft().body)
+        self.unsent_bytes += len(message.body)
+        while self.unsent_bytes > MAX_QUEUED:
+            self.unsent_bytes -= len(self._out.popleft().body)
         self._news.set()
-
-    @property
-    def unsent_bytes(self) -> int:
-        return self._size
 
     def _take(self, broker: BrokerConnection, topic: int, body: bytes) -> None:
         """Handle a message, and read the next one as soon as the rate permits."""
@@ -173,7 +166,7 @@ class StompTransport(ReconnectingTransport):
         for link in self._links:
             for message in reversed(link.format.hello()):
                 self._out.appendleft(message)
-                self._size += len(message.body)
+                self.unsent_bytes += len(message.body)
         self._news.set()
         self._up.set()
 
@@ -193,7 +186,7 @@ class StompTransport(ReconnectingTransport):
                         return  # the next connection sends it again
                     if self._out and self._out[0] is message:
                         self._out.popleft()
-                        self._size -= len(message.body)
+                        self.unsent_bytes -= len(message.body)
         finally:
             lost.cancel()
 

@@ -164,6 +164,8 @@ class XfacePlayerTransport(ReconnectingTransport):
     The player shows the first character of the session `settings.xface_player_session`.
     """
 
+    unsent_bytes = 0  # only the last frame is stored
+
     def __init__(self, sessions: SessionHost, settings: Settings) -> None:
         assert settings.xface_player is not None
         super().__init__("xface player", settings.xface_player)
@@ -177,15 +179,7 @@ class XfacePlayerTransport(ReconnectingTransport):
     def startup_lines(self) -> tuple[str, ...]:
         return (f"xface player: {self._peer} shows session {self._session}",)
 
-    def stop_accepting(self) -> None:
-        """Continue, because playing blocks are shown to their end."""
-
     # the session's side --------------------------------------------------------------------------
-
-    @property
-    def unsent_bytes(self) -> int:
-        """Always 0, because only the last frame is stored."""
-        return 0
 
     def send(self, data: str | bytes) -> None:
         if isinstance(data, str) and data.startswith("{"):
