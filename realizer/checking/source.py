@@ -1,6 +1,6 @@
 """Checking of sources: `realizer.check`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
@@ -43,9 +43,14 @@ def check(
     found: list[Finding] = []
     for number, document in enumerate(documents_of(source), 1):
         player, name = Player(options, animates=False), document.file or f"document {number}"
-        text = SourceText(document.bml)
-        for part in check_document(name, text, document.bml, player):
-            found += part.findings
-            if advice and part.block is not None and part.schedule is not None:
-                found += islice(advice_on(name, text, part.block, part.schedule, player), MAX_ADVICE)
+        found += findings_of(name, document.bml, player, MAX_ADVICE if advice else 0)
     return found
+
+
+def findings_of(name: str, text: bytes | str, player: Player, most_advice: int) -> Iterator[Finding]:
+    """Yield the faults of a document, and after those of each block at most so much advice on it."""
+    source = SourceText(text)
+    for part in check_document(name, source, text, player):
+        yield from part.findings
+        if part.block is not None and part.schedule is not None:
+            yield from islice(advice_on(name, source, part.block, part.schedule, player), most_advice)

@@ -34,6 +34,7 @@ log = logging.getLogger(__name__)
 
 JSON = "application/json; charset=utf-8"
 GLB = "model/gltf-binary"
+BYTES = "application/octet-stream"
 TEXT = "text/plain; charset=utf-8"
 NOT_BUILT = """The page was not bundled when this package was built.
 Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
@@ -90,7 +91,7 @@ class HttpSite:
             "/vocabulary.json": lambda asked: _json(vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
-            "/mirror": lambda asked: _bytes(_mirror(asked.get("light", ""))),
+            "/mirror": lambda asked: HttpResponse(200, BYTES, _mirror(asked.get("light", ""))),
             "/background": self._background,
             "/pose.fap": self._pose,
             "/expressions.webp": self._expressions,
@@ -140,8 +141,7 @@ class HttpSite:
         path = self._settings.background
         if path is None or not is_picture(path):
             return self._file("background")
-        media_type = mimetypes.guess_type(path)[0] or "application/octet-stream"
-        return HttpResponse(200, media_type, Path(path).read_bytes(), (("Cache-Control", "no-cache"),))
+        return HttpResponse(200, _media_type(path), Path(path).read_bytes(), (("Cache-Control", "no-cache"),))
 
     def _pose(self, asked: dict[str, str]) -> HttpResponse:
         face = asked.get("face")
@@ -192,7 +192,7 @@ def _missing(name: str) -> HttpResponse:
 
 
 def _media_type(name: str) -> str:
-    media_type = mimetypes.guess_type(name)[0] or "application/octet-stream"
+    media_type = mimetypes.guess_type(name)[0] or BYTES
     if media_type.startswith("text/") or media_type.endswith("svg+xml"):
         media_type += "; charset=utf-8"
     return media_type
@@ -200,10 +200,6 @@ def _media_type(name: str) -> str:
 
 def _json(text: str | bytes) -> HttpResponse:
     return HttpResponse(200, JSON, text.encode() if isinstance(text, str) else text)
-
-
-def _bytes(body: bytes) -> HttpResponse:
-    return HttpResponse(200, "application/octet-stream", body)
 
 
 def _face(name: str) -> str:

@@ -8,14 +8,12 @@ from typing import Any
 import numpy as np
 
 from bml_schema import Emotion
-from bml_schema.source import Source
 from realizer.animation.fap.conversion import to_fap
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import PlanningContext
-from realizer.checking.advice import advice
-from realizer.checking.document import check_document
 from realizer.checking.finding import Finding
+from realizer.checking.source import findings_of
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.emotions.wheel import blend_weights
@@ -52,14 +50,8 @@ def lint(text: str, settings: Settings) -> str:
     if len(text) > MAX_TEXT:
         words = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
         return json.dumps({"faults": [], "skipped": words})
-    source = Source(text)
-    findings: list[Finding] = []
-    player = Player(settings.play_options())
-    for part in check_document("document", source, text, player):
-        findings += part.findings
-        if part.block is not None and part.schedule is not None:
-            findings += islice(advice("document", source, part.block, part.schedule, player), MAX_FINDINGS)
-    faults = [_finding_json(finding) for finding in findings[:MAX_FINDINGS]]
+    findings = findings_of("document", text, Player(settings.play_options()), MAX_FINDINGS)
+    faults = [_finding_json(finding) for finding in islice(findings, MAX_FINDINGS)]
     return json.dumps({"faults": faults}, ensure_ascii=False)
 
 
