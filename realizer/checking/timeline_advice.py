@@ -66,13 +66,7 @@ def missing_companions(timeline: Timeline, library: Library) -> Iterator[Compani
                 start, end = _times(span, company, library[PREFIX + company.other].duration)
                 if end - start >= MIN_LEAD:
                     yield Companion(
-                        span.track,
-                        span.entry,
-                        PREFIX + company.other,
-                        start,
-                        end,
-                        company.says,
-                        company.keep,
+                        span.track, span.entry, PREFIX + company.other, start, end, company.says, company.keep
                     )
 
 

@@ -132,11 +132,7 @@ class Settings:
     xface_player: str | None = _row(
         None, kind.address, "HOST:PORT of an Xface player that shows a session; none: off"
     )
-    xface_player_session: str = _row(
-        "xface-player",
-        _SESSION,
-        "session that xface_player shows",
-    )
+    xface_player_session: str = _row("xface-player", _SESSION, "session that xface_player shows")
     xface_player_interval: float = _row(
         0.25, kind.real(0, 60), "seconds between frames for xface_player; it stops at shorter ones"
     )

@@ -111,11 +111,7 @@ class Submission:
     """The submission of a session's documents: it reads them, requests speech, and plans blocks."""
 
     def __init__(
-        self,
-        name: str,
-        settings: Settings,
-        player: Player,
-        add_effects: Callable[[Iterable[Effect]], None],
+        self, name: str, settings: Settings, player: Player, add_effects: Callable[[Iterable[Effect]], None]
     ) -> None:
         self.voices: dict[int, str] = {}  # index of a character -> name of its voice
         self.counts = Counter[str]()
