@@ -68,13 +68,18 @@ class SpeechMessage(Message):
     viseme_set: str = Field("oculus", max_length=64, description="of visemes: mpeg4, oculus, sapi or polly")
     final: bool = Field(True, description="whether the description of the clip is complete")
 
+    @property
+    def describes_clip(self) -> bool:
+        """Whether it describes its clip; one that only names the clip changes no annotation."""
+        return bool(self.text is not None or self.words or self.phonemes or self.visemes)
+
     @model_validator(mode="after")
     def _whole(self) -> Self:
         if self.id is None and self.clip is None:
             raise ValueError("wanted the id of a speech, or a clip")
         if self.id is None and (self.append is not None or self.close):
             raise ValueError("wanted the id of the speech that is appended to or closed")
-        if self.clip is None and (self.text is not None or self.words or self.phonemes or self.visemes):
+        if self.clip is None and self.describes_clip:
             raise ValueError("wanted the clip that this describes")
         if self.phonemes and self.visemes:
             raise ValueError("wanted phonemes or visemes, got both")

@@ -158,7 +158,7 @@ class ControlHandlers:
             raise FieldError("blocks", text)
 
     def _speech(self, connection: Connection, message: SpeechMessage, t: float) -> None:
-        annotates = message.clip is not None and (message.id is None or _has_annotation(message))
+        annotates = message.clip is not None and (message.id is None or message.describes_clip)
         if message.id is not None:
             if message.clip is not None:
                 self.clips.check(message, annotates=annotates)
@@ -194,8 +194,3 @@ class ControlHandlers:
 
 def _error(code: ErrorCode, error: Exception, where: str, id: str | None = None) -> ErrorMessage:
     return ErrorMessage(code=code, message=str(error), where=where, id=id)
-
-
-def _has_annotation(message: SpeechMessage) -> bool:
-    """Whether a message describes its clip; one that only names the clip changes no annotation."""
-    return bool(message.text is not None or message.words or message.phonemes or message.visemes)
