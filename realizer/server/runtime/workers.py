@@ -4,8 +4,6 @@ The parent peeks at the first line of a request, which stays in the socket, and 
 that later messages go directly to the worker.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import itertools
@@ -16,7 +14,7 @@ import socket
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Self
 from urllib.parse import parse_qs
 
 from realizer.core.errors import RealizerError
@@ -62,7 +60,7 @@ class Workers:
         self._turn = itertools.count()
         self._ending = False
 
-    async def start(self) -> Workers:
+    async def start(self) -> Self:
         """Start the workers, then open the port.
 
         Raises:
