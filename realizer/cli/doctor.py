@@ -28,18 +28,16 @@ def doctor(as_json: bool) -> None:
 
     Prints one line per part: ok, or missing and how to fix it.
     """
-    parts = (_pictures, _voices, _film, _node, _faces, _page)
     versions = _versions()
     if as_json:
-        found = [{"part": n, "works": works, "text": text} for part in parts for works, n, text in part()]
+        found = [{"part": n, "works": works, "text": text} for works, n, text in _parts()]
         click.echo(json.dumps({"versions": versions, "parts": found}, indent=1))
         return
     words = ", ".join(f"{name} {version or 'missing'}" for name, version in versions.items())
     click.echo(f"{click.style('ok     ', fg='green')}  {'versions':<10} {words}")
-    for part in parts:
-        for works, name, text in part():
-            mark = click.style("ok     ", fg="green") if works else click.style("missing", fg="yellow")
-            click.echo(f"{mark}  {name:<10} {text}")
+    for works, name, text in _parts():
+        mark = click.style("ok     ", fg="green") if works else click.style("missing", fg="yellow")
+        click.echo(f"{mark}  {name:<10} {text}")
 
 
 def _versions() -> dict[str, str | None]:
@@ -53,45 +51,29 @@ def _versions() -> dict[str, str | None]:
     return found
 
 
-def _pictures() -> Iterator[Finding]:
+def _parts() -> Iterator[Finding]:
+    """Yield what works, or how to fix it, as soon as it is known."""
+    from realizer.face.load import list_faces
+    from realizer.facebuild.check import check_face
     from realizer.render.drawing_process import available_backend
+    from realizer.speech.registry import voices
 
     descriptions = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
     backend, fix = available_backend()
     yield fix is None, "pictures", fix or descriptions[backend]
-
-
-def _voices() -> Iterator[Finding]:
-    from realizer.speech.registry import voices
-
     for voice in voices():
         yield voice.available, voice.name, voice.description
-
-
-def _film() -> Iterator[Finding]:
     fix = _fix("film")
     yield fix is None, "FFmpeg", fix or "PyAV writes films"
-
-
-def _node() -> Iterator[Finding]:
     works = shutil.which("npm") is not None
     text = "npm is used to build the page from source"
     yield works, "node", text if works else "not needed to run; the build takes node from a wheel"
-
-
-def _faces() -> Iterator[Finding]:
-    from realizer.face.load import list_faces
-    from realizer.facebuild.check import check_face
-
     faces = list_faces()
     if not faces:
         yield False, "faces", "no face folder was found; reinstall bml-realizer"
     for face in faces:
         faults = check_face(face.name)
         yield not faults, "face", f"{face.name}: {faults[0] if faults else face.description}"
-
-
-def _page() -> Iterator[Finding]:
     works = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
     yield works, "page", "served at http://HOST:PORT/" if works else fix
