@@ -14,8 +14,7 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from realizer.protocol.wire import unpack
 from realizer.server.asgi.openapi import VIDEO
-from realizer.server.asgi.playout import Playout
-from realizer.server.asgi.tracks import RATE, PictureTrack, SoundTrack
+from realizer.server.asgi.tracks import RATE, PictureTrack, Playout, SoundTrack
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 
