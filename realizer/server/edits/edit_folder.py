@@ -16,8 +16,6 @@ from realizer.protocol.messages.replies import ErrorCode, ErrorMessage, Saved
 from realizer.server.session.effects import Write
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
-SUFFIX = re.compile(r"\.[a-z0-9]{1,8}")
-MAX_FILE = 64 * 2**20  # bytes
 LOCK = ".lock"
 
 
@@ -49,50 +47,43 @@ class EditFolder:
         for name in names:
             if not NAME.fullmatch(name):
                 raise EditError(f"name: wanted a-z, 0-9, - and _, up to 64 of them, got {name[:80]!r}")
-        if not names or not SUFFIX.fullmatch(suffix):
-            raise EditError(f"name: wanted a name and a suffix such as .toml, got {suffix[:80]!r}")
         path = self._folder.joinpath(*names).with_suffix(suffix)
         if not path.resolve().is_relative_to(self._folder):
             raise EditError(f"{'/'.join(names)}{suffix}: wanted a file of this folder, got a link to another")
         return path
 
-    def write(self, *names: str, suffix: str, content: bytes, version: str | None) -> str:
+    def write(self, path: Path, content: bytes, version: str | None) -> str:
         """Write a file, complete or not at all, and return its new version.
 
         Args:
+            path: as `path` returns it.
             version: of the file that this replaces; None: there is none.
 
         Raises:
-            EditError: a wrong name; too much; the file has changed since `version`; or it cannot be written.
+            EditError: the file has changed since `version`, or it cannot be written.
         """
-        path = self.path(*names, suffix=suffix)
         place = path.relative_to(self._folder)
-        if len(content) > MAX_FILE:
-            raise EditError(f"{place}: wanted at most {MAX_FILE} bytes, got {len(content)}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             # Another process of the service may save as well.
             with (self._folder / LOCK).open("a") as guard:
                 if not lock(guard):
                     raise EditError(f"{place}: another process saves just now: try again")
-                self._check(path, version)
+                present = version_of(path.read_bytes()) if path.exists() else None
+                if present != version:
+                    raise EditError(f"{place}: {_conflict(present, version)}", "conflict")
                 write_bytes(path, content)
         except OSError as error:
             raise EditError(f"{place}: cannot be saved: {error.strerror or error}") from None
         return version_of(content)
 
-    def _check(self, path: Path, version: str | None) -> None:
-        place = path.relative_to(self._folder)
-        present = version_of(path.read_bytes()) if path.exists() else None
-        if present == version:
-            return
-        if present is None:
-            words = f"{place}: wanted the file that was opened, but it is gone: save it as a new one"
-        elif version is None:
-            words = f"{place}: wanted a new name, as there is such a file"
-        else:
-            words = f"{place}: it was changed since it was opened: open it again, or save as another name"
-        raise EditError(words, "conflict")
+
+def _conflict(present: str | None, version: str | None) -> str:
+    if present is None:
+        return "wanted the file that was opened, but it is gone: save it as a new one"
+    if version is None:
+        return "wanted a new name, as there is such a file"
+    return "it was changed since it was opened: open it again, or save as another name"
 
 
 class Kind(NamedTuple):
@@ -112,15 +103,13 @@ def save(order: Write) -> Reply:
         content = _content(message.content, message.encoding)
         path = folder.path(kind.folder, message.name, suffix=kind.suffix)
         kind.check(path, content)
-        version = folder.write(
-            kind.folder, message.name, suffix=kind.suffix, content=content, version=message.version
-        )
+        version = folder.write(path, content, message.version)
     except RealizerError as error:
         code = error.code if isinstance(error, EditError) else "edit"
         # The client knows the file by its place in the folder only.
         words = str(error).replace(f"{order.folder.resolve()}/", "")
         return ErrorMessage(code=code, message=words, where="save")
-    place = f"{kind.folder}/{message.name}{kind.suffix}"
+    place = path.relative_to(order.folder.resolve()).as_posix()
     return Saved(kind=message.kind, name=message.name, version=version, file=place)
 
 

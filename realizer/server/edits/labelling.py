@@ -146,12 +146,11 @@ class Labelling:
         changed, annotator = self._changed(asked, found)
         if (now := _version(found, annotator)) != asked.get("version"):
             raise Conflict(f"{found.name}: the labels of {annotator} were changed since you opened them", now)
-        folder = self._corpus() / found.name
-        file = folder / LABELS
-        before = version_of(file.read_bytes()) if file.exists() else None
+        folder = EditFolder(self._corpus() / found.name)
         text = csv_text(COLUMNS[LABELS], map(astuple, changed.labels))
         try:
-            EditFolder(folder).write("labels", suffix=".csv", content=text.encode(), version=before)
+            file = folder.path("labels", suffix=".csv")
+            folder.write(file, text.encode(), version_of(file.read_bytes()) if file.exists() else None)
         except EditError as error:
             raise CorpusError(f"{found.name}/{error}; the draft stays in this browser") from None
         return {"version": _version(changed, annotator), "labels": _rows(changed, annotator)}, {}
