@@ -14,6 +14,10 @@ LONGEST = 20_000  # characters of one message
 # wait behind them.
 PAUSE = 0.01  # s
 
+# Methods of a client: `control` and `wait_for`.
+Control = Callable[..., Awaitable[None]]
+Wait = Callable[[Callable[[], bool]], Awaitable[None]]
+
 
 class SpeechProgress:
     """A listener to the feedback of one speech.
@@ -88,13 +92,7 @@ class OpenSpeech(ABC):
     `async with` closes it at its end, and stops it after an exception.
     """
 
-    def __init__(
-        self,
-        id: str,
-        opening: Mapping[str, Any],
-        control: Callable[..., Awaitable[None]],
-        wait: Callable[[Callable[[], bool]], Awaitable[None]],
-    ) -> None:
+    def __init__(self, id: str, opening: Mapping[str, Any], control: Control, wait: Wait) -> None:
         self.id = id
         self.progress = SpeechProgress(id)
         self._opening: dict[str, Any] | None = dict(opening)  # None: the service knows of it
@@ -151,12 +149,7 @@ class Speech(OpenSpeech):
     """A speech whose text is sent as it comes, which `Client.speech` returns."""
 
     def __init__(
-        self,
-        id: str,
-        opening: Mapping[str, Any],
-        control: Callable[..., Awaitable[None]],
-        wait: Callable[[Callable[[], bool]], Awaitable[None]],
-        check: Callable[[], None],
+        self, id: str, opening: Mapping[str, Any], control: Control, wait: Wait, check: Callable[[], None]
     ) -> None:
         super().__init__(id, opening, control, wait)
         self._check = check

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from realizer.client.speech import OpenSpeech
+from realizer.client.speech import Control, OpenSpeech, Wait
 from realizer.core.array_types import Float32, Float64, Int16
 from realizer.protocol.wire import ClipPiece, pack_clip
 
@@ -19,6 +19,7 @@ LONGEST = 1 << 20  # bytes of one message
 HOLD = 1.0  # s
 DESCRIBING = ("text", "words", "phonemes", "visemes")  # fields of `speech`
 
+Send = Callable[[bytes], Awaitable[None]]
 Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
 Timed = tuple[float, str] | tuple[float, float, str]
 
@@ -27,12 +28,7 @@ class Voice(OpenSpeech):
     """A speech whose sound is sent as it comes, which `Client.voice` returns."""
 
     def __init__(
-        self,
-        rate: int,
-        opening: Mapping[str, Any],
-        send: Callable[[bytes], Awaitable[None]],
-        control: Callable[..., Awaitable[None]],
-        wait: Callable[[Callable[[], bool]], Awaitable[None]],
+        self, rate: int, opening: Mapping[str, Any], send: Send, control: Control, wait: Wait
     ) -> None:
         super().__init__(f"say-{secrets.token_hex(4)}", opening, control, wait)
         self._rate = checked_rate(rate)
