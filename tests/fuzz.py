@@ -203,7 +203,7 @@ def task_streams() -> tuple[bytes, ...]:
             Task("UPLOAD_FAP", 1, n, (text,)),
             Task("RESUME_PLAYBACK", 1, n + 1),
             Task("UPLOAD_SCRIPT", 1, n + 2, (f"<![CDATA[{script}]]>", "BML")),
-            *(Task(name, n % 2, 9) for name in sorted(ABLE | UNABLE) if name != "UPLOAD_WAV"),
+            *(Task(name, n % 2, 9) for name in sorted(ABLE + UNABLE) if name != "UPLOAD_WAV"),
             Task("UPLOAD_WAV", 1, 3, ("x.wav", "5")),
         ]
         streams.append(b"".join(pack_task(task) for task in tasks[n % 3 :]) + b"RIFF\0")

@@ -21,18 +21,14 @@ log = logging.getLogger(__name__)
 Answer = bytes | Inbound | Disconnect
 ERROR = pack_note("ERROR", 0, 0, Status.ERROR)
 # Tasks of Xface's own player for its meshes, scripts and films, which have no equivalent here.
-UNABLE = frozenset(
-    {
-        *("LOAD_WAV", "LOAD_PHO", "LOAD_ANIM", "LOAD_FDP", "UPLOAD_WAV", "UPLOAD_PHO", "UPLOAD_ANIM"),
-        *("UPLOAD_FDP", "UPLOAD_APML", "SAVE_AVI"),
-    }
-)
-ABLE = frozenset(
-    {
-        *("UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT", "RESUME_PLAYBACK", "STOP_PLAYBACK", "REWIND_PLAYBACK"),
-        *("PAUSE_PLAYBACK", "RENDER_FRAME", "ADVANCE_FRAME", "KILL_APP"),
-    }
-)
+UNABLE = (
+    "LOAD_WAV", "LOAD_PHO", "LOAD_ANIM", "LOAD_FDP", "UPLOAD_WAV", "UPLOAD_PHO", "UPLOAD_ANIM", "UPLOAD_FDP",
+    "UPLOAD_APML", "SAVE_AVI",
+)  # fmt: skip
+ABLE = (
+    "UPLOAD_FAP", "LOAD_FAP", "UPLOAD_SCRIPT", "RESUME_PLAYBACK", "STOP_PLAYBACK", "REWIND_PLAYBACK",
+    "PAUSE_PLAYBACK", "RENDER_FRAME", "ADVANCE_FRAME", "KILL_APP",
+)  # fmt: skip
 _NAMES = tuple(row.name for row in faps()[2:])
 MAX_WAITING = 100  # queued tasks of a client
 
@@ -69,7 +65,7 @@ class TaskRunner:
 
     def accept(self, task: Task) -> Iterator[Answer]:
         """Yield the answers to a task that has arrived, before it runs."""
-        if task.name not in ABLE | UNABLE:
+        if task.name not in ABLE + UNABLE:
             log.info("xface: wanted a task of the player, got %s", task.name)
             yield from self.refuse(task)
         elif task.name != "KILL_APP":
@@ -77,7 +73,7 @@ class TaskRunner:
 
     def refuse(self, task: Task) -> Iterator[Answer]:
         """Yield the answers to an unknown or unreadable task."""
-        if task.name in ABLE | UNABLE:
+        if task.name in ABLE + UNABLE:
             yield from _notes(task, Status.ERROR)
         else:
             yield pack_note("ERROR", task.owner, task.id, Status.ERROR)
@@ -91,12 +87,9 @@ class TaskRunner:
         if isinstance(attachment, RealizerError) or task.name in UNABLE:
             log.info("xface: %s: %s", task.name, attachment or "not something this player does")
             yield from _notes(task, Status.ERROR)
-            if (
-                isinstance(attachment, RealizerError)
-                and not isinstance(attachment, MissingAttachment)
-                and "FAP" in task.name
-            ):
-                yield from _notes(task, Status.FINISHED)  # clients of Xface's own player rely on it
+            # Clients of Xface's own player rely on the second note.
+            if "FAP" in task.name and not isinstance(attachment, MissingAttachment):
+                yield from _notes(task, Status.FINISHED)
             return
         match task.name, attachment:
             case (("UPLOAD_FAP" | "LOAD_FAP"), FAPClip()):

@@ -234,7 +234,7 @@ def test_task_runner_answers_an_unknown_task_with_its_ids() -> None:
     assert talk._short(talk.runner.refuse(Task("UPLOAD_FAP", 1, 5))) == [("UPLOAD_FAP", 5, 7)]
 
 
-@pytest.mark.parametrize("name", sorted(ABLE | UNABLE))
+@pytest.mark.parametrize("name", sorted(ABLE + UNABLE))
 def test_task_runner_sends_no_notes_to_owner_0(name: str) -> None:
     runner, task = TaskRunner(1), Task(name, 0, 5)
     assert not [a for a in (*runner.accept(task), *runner.run(task, None, 0.0)) if isinstance(a, bytes)]
