@@ -9,19 +9,6 @@ from realizer.client.voice import Voice
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
 __all__ = [
-    "AUFrame",
-    "ArkitFrame",
-    "Client",
-    "ClientError",
-    "FapFrame",
-    "Frame",
-    "MeshFrame",
-    "PictureFrame",
-    "SoundFrame",
-    "Speech",
-    "SyncClient",
-    "SyncSpeech",
-    "SyncVoice",
-    "Voice",
-    "connect",
-]
+    "AUFrame", "ArkitFrame", "Client", "ClientError", "FapFrame", "Frame", "MeshFrame", "PictureFrame",
+    "SoundFrame", "Speech", "SyncClient", "SyncSpeech", "SyncVoice", "Voice", "connect",
+]  # fmt: skip

@@ -67,19 +67,13 @@ def parse_control(text: str, *, can_save: bool = False) -> Control | ErrorMessag
         return ErrorMessage(code="bad-json", message=words)
     kind = message.get("type")
     if kind not in SUPPORTED:
-        return ErrorMessage(
-            code="unsupported",
-            message=f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}",
-            where="type",
-        )
+        words = f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}"
+        return ErrorMessage(code="unsupported", message=words, where="type")
     if kind != "save" and len(text) > MAX_CONTROL:
         return _too_large(text)
     if kind == "subscribe" and message.get("stream") not in tuple(STREAMS):
-        return ErrorMessage(
-            code="unsupported",
-            message=f"wanted a stream of {', '.join(STREAMS)}; got {_short(message.get('stream'))}",
-            where="subscribe.stream",
-        )
+        words = f"wanted a stream of {', '.join(STREAMS)}; got {_short(message.get('stream'))}"
+        return ErrorMessage(code="unsupported", message=words, where="subscribe.stream")
     try:
         return _ADAPTER.validate_python(message)
     except ValidationError as error:

@@ -155,21 +155,9 @@ class StateMessage(Reply):
 
 
 ErrorCode = Literal[
-    "bad-json",
-    "too-large",
-    "unsupported",
-    "invalid",
-    "version",
-    "clip",
-    "face",
-    "voice",
-    "render",
-    "rate",
-    "token",
-    "journal",
-    "edit",
-    "conflict",
-]
+    "bad-json", "too-large", "unsupported", "invalid", "version", "clip", "face", "voice", "render", "rate",
+    "token", "journal", "edit", "conflict",
+]  # fmt: skip
 
 
 class ErrorMessage(Reply):

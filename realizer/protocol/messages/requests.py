@@ -271,18 +271,6 @@ class Ping(Message):
 
 
 Control = (
-    Hello
-    | Subscribe
-    | Unsubscribe
-    | SceneMessage
-    | CharacterMessage
-    | SetMessage
-    | Heard
-    | Track
-    | Save
-    | Anticipate
-    | SpeechMessage
-    | Stop
-    | StateQuery
-    | Ping
-)
+    Hello | Subscribe | Unsubscribe | SceneMessage | CharacterMessage | SetMessage | Heard | Track | Save
+    | Anticipate | SpeechMessage | Stop | StateQuery | Ping
+)  # fmt: skip
