@@ -44,15 +44,8 @@ def timeline_advice(
         if template := _template(expression):
             seen.append(VisibleExpression(span.place, template, span.begin, span.end))
             continue
-        source = str(expression.file or expression.source)
-        yield from duration_advice(
-            span.place,
-            expression.name,
-            span.end - span.begin,
-            expression.possible,
-            expression.probable,
-            source,
-        )
+        usual = expression.possible, expression.probable, str(expression.file or expression.source)
+        yield from duration_advice(span.place, expression.name, span.end - span.begin, *usual)
     yield from advise(Block(id="timeline"), seen, {}, role, mood)
 
 

@@ -151,17 +151,9 @@ def _expressions(block: Block, schedule: Schedule, left: list[str]) -> Iterable[
             name, amount, because = _shown(node)
             at = dict(zip(schedule.points[node.id], (schedule.start + times).tolist(), strict=True))
             start, end = at["start"], at["end"]
-            yield (
-                start,
-                Entry(
-                    name,
-                    amount,
-                    round(max(end - start, MIN_SECONDS), 3),
-                    round(max(at["attackPeak"] - start, MIN_SECONDS), 3),
-                    round(max(end - at["relax"], MIN_SECONDS), 3),
-                    because,
-                ),
-            )
+            lengths = (end - start, at["attackPeak"] - start, end - at["relax"])
+            duration, onset, offset = (round(max(seconds, MIN_SECONDS), 3) for seconds in lengths)
+            yield start, Entry(name, amount, duration, onset, offset, because)
         elif isinstance(node, FaceKeyframe) and node.type == "FAPS":
             yield _keyframes(node, schedule.start + float(times[0]), float(times[-1] - times[0]))
         elif not isinstance(node, Speech):
@@ -251,23 +243,19 @@ def _block(timeline: Timeline, settings: Settings, says: Sequence[tuple[float, s
     children: list[Speech | Expression | FaceKeyframe] = [*_speeches(says)]
     for number, track in enumerate(timeline.tracks, 1):
         for k, span in enumerate(spans(track, library), 1):
+            id = f"channel{number}-{k}"
             if span.entry.is_keyframes:
-                children.append(_keyframe(f"channel{number}-{k}", span))
+                children.append(_keyframe(id, span))
             elif span.entry.is_expression:
-                times = (span.start, span.reached, span.left, span.end)
-                points = zip(("start", "attackPeak", "relax", "end"), times, strict=True)
-                syncs = {name: SyncRef(offset=round(time, 3)) for name, time in points}
-                entry = span.entry
-                children.append(
-                    Expression(
-                        id=f"channel{number}-{k}",
-                        name=entry.expression,
-                        intensity=entry.intensity,
-                        because=entry.because,
-                        syncs=syncs,
-                    )
-                )
+                children.append(_expression(id, span))
     return Block(id="timeline", children=tuple(children))
+
+
+def _expression(id: str, span: Span) -> Expression:
+    times = {"start": span.start, "attackPeak": span.reached, "relax": span.left, "end": span.end}
+    syncs = {name: SyncRef(offset=round(time, 3)) for name, time in times.items()}
+    name, intensity, because = span.entry.expression, span.entry.intensity, span.entry.because
+    return Expression(id=id, name=name, intensity=intensity, because=because, syncs=syncs)
 
 
 def _keyframe(id: str, span: Span) -> FaceKeyframe:
