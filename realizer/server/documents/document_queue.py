@@ -51,16 +51,9 @@ class DocumentQueue:
             return Warning(block_id_of(text), "PARSING_FAILURE", f"{error} {limit_hint('max_blocks')}")
         if (too_large := size_error(text, limits)) is not None:
             return Warning(block_id_of(text), "PARSING_FAILURE", too_large)
-        self._unread.append(
-            read(
-                text,
-                VOCABULARY,
-                max_bytes=limits.max_document,
-                max_behaviours=limits.max_behaviours,
-                strict_bml=limits.strict_bml,
-                block_ids=self._block_ids,
-            )
-        )
+        most = {"max_bytes": limits.max_document, "max_behaviours": limits.max_behaviours}
+        ids, strict_bml = self._block_ids, limits.strict_bml
+        self._unread.append(read(text, VOCABULARY, block_ids=ids, strict_bml=strict_bml, **most))
         self.received += 1
         return None
 
@@ -195,14 +188,9 @@ class Submission:
             requests = self._player.speech_requests(block)
             character = self._player.character_index(block.character_id)
             pending = PendingBlock(
-                block,
-                character,
-                t,
-                message,
-                self._player.resources,
-                is_incomplete=self.speeches.awaits_sync,
-                is_streaming=self.speeches.is_streaming(block),
+                block, character, t, message, self._player.resources, is_incomplete=self.speeches.awaits_sync
             )
+            pending.is_streaming = self.speeches.is_streaming(block)
             self.pending.add(pending)
             self._player.announce(block, t)
         except Exception:

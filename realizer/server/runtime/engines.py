@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
 from realizer.core.work import FairPool
@@ -123,17 +123,9 @@ class Engines:
             if slot is None:
                 if len(self._slots) >= RENDERERS:
                     removed = self._slots.pop(self._least_recent(now))
-                slot = self._slots[key] = _RendererSlot(
-                    Renderer(
-                        order.face,
-                        options.size,
-                        options.camera,
-                        light=options.light,
-                        background=options.background,
-                        deformer=self._deformer,
-                    ),
-                    now,
-                )
+                look: dict[str, Any] = {"light": options.light, "background": options.background}
+                renderer = Renderer(order.face, options.size, options.camera, deformer=self._deformer, **look)
+                slot = self._slots[key] = _RendererSlot(renderer, now)
             slot.busy += 1
             slot.used = now
         if removed is not None:
