@@ -194,11 +194,8 @@ class AccessControl:
             JoinError: 403, a page of another origin; 401, no token or a wrong one.
         """
         if not self.allows_origin(headers):
-            raise JoinError(
-                HTTPStatus.FORBIDDEN,
-                f"origin: wanted a page of this service, got one of {headers['origin'][:200]!r}; "
-                "REALIZER_ORIGINS lets more in",
-            )
+            words = f"origin: wanted a page of this service, got one of {headers['origin'][:200]!r}"
+            raise JoinError(HTTPStatus.FORBIDDEN, f"{words}; REALIZER_ORIGINS lets more in")
         scheme, _, credentials = headers.get("authorization", "").partition(" ")
         query = parse_qs(target.partition("?")[2]).get("token", [None])[-1]
         token = credentials.strip() if scheme.lower() == "bearer" else query
@@ -219,10 +216,8 @@ class AccessControl:
         # No name server can make an address lead elsewhere.
         if self._settings.host in EVERYWHERE and _is_address(name):
             return
-        raise JoinError(
-            HTTPStatus.FORBIDDEN,
-            f"host: wanted a name of this service, got {str(host)[:200]!r}; REALIZER_HOSTS adds names",
-        )
+        words = f"host: wanted a name of this service, got {str(host)[:200]!r}; REALIZER_HOSTS adds names"
+        raise JoinError(HTTPStatus.FORBIDDEN, words)
 
     def check_hello(self, message: str | bytes) -> Grant:
         """Return the grant of the token in a first message.

@@ -2,6 +2,7 @@
 
 import functools
 import json
+from collections.abc import Sequence
 from typing import Any
 
 from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, Constraint, Required
@@ -100,15 +101,9 @@ def _element(cls: type[Any], children: dict[str, list[str]]) -> dict[str, Any]:
     for spec in shape.attributes.values():
         space, _, plain = spec.name.rpartition("}")
         prefix = PREFIXES.get(space[1:], "")
-        attributes.append(
-            _attribute(
-                f"{prefix}:{plain}" if prefix else plain,
-                spec.value.wanted,
-                spec.value.words,
-                required=spec.required,
-                namespace=space[1:],
-            )
-        )
+        written = f"{prefix}:{plain}" if prefix else plain
+        attribute = _attribute(written, spec.value.wanted, spec.value.words, required=spec.required)
+        attributes.append(attribute | {"namespace": space[1:]})
     return {
         "name": name,
         "namespace": namespace,
@@ -121,12 +116,6 @@ def _element(cls: type[Any], children: dict[str, list[str]]) -> dict[str, Any]:
 
 
 def _attribute(
-    name: str, wanted: str, words: tuple[str, ...] = (), *, required: bool = False, namespace: str = ""
+    name: str, wanted: str, words: Sequence[str] = (), *, required: bool = False
 ) -> dict[str, Any]:
-    return {
-        "name": name,
-        "wanted": wanted,
-        "words": list(words),
-        "required": required,
-        "namespace": namespace,
-    }
+    return {"name": name, "wanted": wanted, "words": list(words), "required": required, "namespace": ""}
