@@ -60,7 +60,6 @@ class Listener(Protocol):
 
     def on_error(self, error: dict[str, Any]) -> None:
         """Handle an error about a message that has no answer."""
-        ...
 
 
 class Receiver(Protocol):

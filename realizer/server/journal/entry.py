@@ -133,35 +133,27 @@ class Journal(Protocol):
 
     def begin(self, session: str, epoch: float) -> None:
         """Add a new session, whose clock is 0 at the POSIX time `epoch`."""
-        ...
 
     def add(self, session: str, entry: Entry) -> None:
         """Append an entry; it is stored when this returns."""
-        ...
 
     def end(self, session: str) -> None:
         """End a session. Errors are ignored: expired sessions are deleted later."""
-        ...
 
     def close(self) -> None:
         """Close the log."""
-        ...
 
     def claim(self, session: str) -> SavedSession | None:
         """Take a session over and return it, or None if there is none."""
-        ...
 
     def note(self, session: str, text: str | None) -> None:
         """Store a note about the replay as the part `replay`, or delete it (None)."""
-        ...
 
     def replace(self, session: str, index: int, entry: Entry) -> None:
         """Replace an entry after the checkpoint by another, and delete the note about the replay."""
-        ...
 
     def taken_over(self, sessions: Collection[str]) -> set[str]:
         """Return those of these sessions that another process has taken over. May block, in any thread."""
-        ...
 
     def compact(self, session: str, parts: Mapping[str, str | None]) -> None:
         """Replace the entries of a session by a checkpoint, in one transaction.
@@ -169,4 +161,3 @@ class Journal(Protocol):
         Args:
             parts: name -> text of each new or changed part, None for a part to delete; others stay.
         """
-        ...

@@ -36,23 +36,18 @@ class ClientSocket(Outbound, Protocol):
     @property
     def close_code(self) -> int | None:
         """The code with which it was closed."""
-        ...
 
     def on_rate(self, warn: Callable[[str], None]) -> None:
         """Call `warn` with a notice when the client sends too fast."""
-        ...
 
     async def receive(self) -> str | bytes | None:
         """Return the next message; None after the last."""
-        ...
 
     async def send_all(self, text: str | bytes) -> None:
         """Send a message, and wait until the network has taken it, or the connection has ended."""
-        ...
 
     async def close(self, code: int, reason: str) -> None:
         """Close the connection and wait until it is closed."""
-        ...
 
 
 class WebSocketConnections:
