@@ -7,8 +7,6 @@ import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
 
-from websockets.asyncio.server import ServerConnection
-
 from realizer.core.settings import Settings, limit_hint
 from realizer.face.load import face_tool
 from realizer.protocol.messages.replies import ErrorMessage
@@ -21,7 +19,6 @@ from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.transport import Outbound
-from realizer.server.transports.websocket.protocol import WebSocketClient
 
 log = logging.getLogger(__name__)
 
@@ -100,10 +97,6 @@ class WebSocketConnections:
         if self._from.count(address) >= most:
             words = f"{most} connections from {address} are open: wanted fewer"
             raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, f"{words} {limit_hint('max_connections')}")
-
-    async def handle(self, socket: ServerConnection) -> None:
-        """Serve a WebSocket of the websockets library until it closes."""
-        await self.serve(WebSocketClient(socket))
 
     async def serve(self, client: ClientSocket) -> None:
         """Serve one WebSocket until it closes."""

@@ -20,7 +20,7 @@ from realizer.server.http.requests import SOCKETS, HttpRequests, address_of, hea
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.websocket.connection import WebSocketConnections
-from realizer.server.transports.websocket.protocol import GOODBYE, Connection, Protocol
+from realizer.server.transports.websocket.protocol import GOODBYE, Connection, Protocol, WebSocketClient
 
 PATIENCE: Mapping[str, Any] = {"ping_interval": 20, "ping_timeout": 60}  # s
 OPENING = 10.0  # s; time for the HTTP request
@@ -67,7 +67,7 @@ class WebSocketTransport:
         else:
             options |= {"unix": True, "sock": _unreachable_socket()}
         self._socket = await listen(
-            self._connections.handle,
+            lambda socket: self._connections.serve(WebSocketClient(socket)),
             process_request=self._http,
             compression=None,  # frames are dense, and a late one is worse than a large one
             open_timeout=OPENING,
