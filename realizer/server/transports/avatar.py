@@ -33,6 +33,8 @@ class AvatarTransport(ReconnectingTransport):
         super().__init__(name, peer)
         self._sessions = sessions
         self._session = settings.avatar_session
+        shown = "the oldest session with a client" if self._session is None else f"session {self._session}"
+        self.startup_lines = (f"{name}: {peer} shows {shown}",)
         self._fps = settings.avatar_fps
         self._shown: str | None = None
         self._number = 0
@@ -41,11 +43,6 @@ class AvatarTransport(ReconnectingTransport):
     @abstractmethod
     def packets(self, frame: int, time: float, values: Sequence[float]) -> Iterable[bytes]:
         """Return the packets of a frame of the stream arkit: its number, its seconds and its 59 values."""
-
-    @property
-    def startup_lines(self) -> tuple[str, ...]:
-        shown = "the oldest session with a client" if self._session is None else f"session {self._session}"
-        return (f"{self._name}: {self._peer} shows {shown}",)
 
     def send(self, data: str | bytes) -> None:
         if self._udp is None or not isinstance(data, str) or not data.startswith("{"):

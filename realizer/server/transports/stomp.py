@@ -57,6 +57,8 @@ class StompTransport(ReconnectingTransport):
             for name, (setting, make) in MESSAGE_FORMATS.items()
             if (topic := getattr(settings, setting)) is not None
         ]
+        names = ", ".join(f"{link.format.topic} in session {link.name}" for link in self._links)
+        self.startup_lines = (f"stomp: {self._peer} reads {names}",)
         self._limiter = RateLimiter(settings.max_rate)
         self._thread = ThreadPoolExecutor(1, "stomp")
         self._broker: BrokerConnection | None = None
@@ -64,11 +66,6 @@ class StompTransport(ReconnectingTransport):
         self.unsent_bytes = 0  # characters in _out
         self._news = asyncio.Event()
         self._leaving: asyncio.Task[None] | None = None
-
-    @property
-    def startup_lines(self) -> tuple[str, ...]:
-        names = ", ".join(f"{link.format.topic} in session {link.name}" for link in self._links)
-        return (f"stomp: {self._peer} reads {names}",)
 
     async def start(self) -> None:
         check_installed()

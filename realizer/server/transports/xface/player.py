@@ -170,14 +170,11 @@ class XfacePlayerTransport(ReconnectingTransport):
         assert settings.xface_player is not None
         super().__init__("xface player", settings.xface_player)
         self._session = settings.xface_player_session
+        self.startup_lines = (f"xface player: {self._peer} shows session {self._session}",)
         self._sessions = sessions
         self._link = PlayerLink(settings.xface_player_interval)
         self._writer: asyncio.StreamWriter | None = None
         self._timer: asyncio.TimerHandle | None = None
-
-    @property
-    def startup_lines(self) -> tuple[str, ...]:
-        return (f"xface player: {self._peer} shows session {self._session}",)
 
     # the session's side --------------------------------------------------------------------------
 
