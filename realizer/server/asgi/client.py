@@ -91,11 +91,8 @@ class AsgiClient:
         while (data := await self._queue.get()) is not None:
             try:
                 if self.close_code is None:
-                    await (
-                        self._socket.send_text(data)
-                        if isinstance(data, str)
-                        else self._socket.send_bytes(data)
-                    )
+                    field = "text" if isinstance(data, str) else "bytes"
+                    await self._socket.send({"type": "websocket.send", field: data})
             except (RuntimeError, WebSocketDisconnect):
                 self.close_code = self.close_code or 1006
             self.unsent_bytes -= len(data)

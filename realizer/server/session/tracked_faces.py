@@ -75,10 +75,8 @@ class TrackedFaces:
             return False
         camera = self.cameras.get(connection)
         if camera is None or len(message) <= HEADER.size:
-            text = (
-                "wanted `track` before pictures" if camera is None else "wanted a picture behind the header"
-            )
-            self.connections.reply(connection, ErrorMessage(code="unsupported", message=text))
+            text = "a picture behind the header" if camera else "`track` before pictures"
+            self.connections.reply(connection, ErrorMessage(code="unsupported", message=f"wanted {text}"))
         elif camera.is_busy:
             camera.waiting = message
         elif t - camera.last[0] >= EARLY / camera.fps:
@@ -95,9 +93,8 @@ class TrackedFaces:
         camera.is_busy = False
         time, number = camera.last
         if isinstance(result, RealizerError):
-            self.connections.reply(
-                connection, ErrorMessage(code="unsupported", message=str(result), where="track")
-            )
+            fault = ErrorMessage(code="unsupported", message=str(result), where="track")
+            self.connections.reply(connection, fault)
         else:
             seen: dict[str, Any] = {}
             if result is not None:
