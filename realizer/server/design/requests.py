@@ -26,10 +26,6 @@ from realizer.tables.lexemes import read_aus
 MAX_REQUEST = 1_000_000  # characters
 
 
-class DesignError(RealizerError):
-    """A request that cannot be answered; the text says what was wanted."""
-
-
 def answer(text: str, settings: Settings) -> str:
     """Return the answer to a request as JSON; {"error": text} if there is none.
 
@@ -38,11 +34,11 @@ def answer(text: str, settings: Settings) -> str:
     """
     try:
         if len(text) > MAX_REQUEST:
-            raise DesignError(f"wanted at most {MAX_REQUEST} characters, got {len(text)}")
+            raise RealizerError(f"wanted at most {MAX_REQUEST} characters, got {len(text)}")
         request = json.loads(text)
         tool = TOOLS.get(request.get("tool")) if isinstance(request, dict) else None
         if tool is None:
-            raise DesignError(f"tool: wanted one of {', '.join(TOOLS)}")
+            raise RealizerError(f"tool: wanted one of {', '.join(TOOLS)}")
         return json.dumps(tool(request, settings), ensure_ascii=False, separators=(",", ":"))
     except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
         words = error.args[0] if isinstance(error, KeyError) and error.args else error

@@ -33,12 +33,7 @@ STEP = 0.005  # s; between attempts to pass a socket to a busy worker, or to rea
 # The first byte from a worker: its transports are open, or an error text follows.
 READY, FAULT = b"r", b"!"
 
-
 Serve = Callable[[Settings, int, socket.socket], None]
-
-
-class WorkerError(RealizerError):
-    """A worker cannot be started."""
 
 
 class Workers:
@@ -65,7 +60,7 @@ class Workers:
 
         Raises:
             OSError: the address is not available.
-            WorkerError: a worker cannot start.
+            RealizerError: a worker cannot start.
         """
         loop = asyncio.get_running_loop()
         addresses = await loop.getaddrinfo(
@@ -83,7 +78,7 @@ class Workers:
                 self._children.append(self._start_worker(number))
             for _, control in self._children:
                 if (words := await _startup_error(control)) is not None:
-                    raise WorkerError(words)
+                    raise RealizerError(words)
         except BaseException:
             await self.close()
             raise
