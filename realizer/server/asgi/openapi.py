@@ -42,10 +42,8 @@ def description(prefix: str = "") -> dict[str, Any]:
     formats = [name.removeprefix(".") for name in OUTPUTS]
     files = {output.media_type: {"schema": {"type": "string"}} for output in OUTPUTS.values()}
     query = [_query("format", {"type": "string", "enum": formats, "default": "json"})]
-    query += [
-        _query(name, {"type": "string", "pattern": f"^({form.pattern})$"})
-        for name, (_, form) in OPTIONS.items()
-    ]
+    forms = {name: {"type": "string", "pattern": f"^({form.pattern})$"} for name, form in OPTIONS.items()}
+    query += [_query(name, schema) for name, schema in forms.items()]
     video = [_query(name, {"type": "string"}) for name in VIDEO]
     seen = _query("seen", {"type": "integer"}, "send also the feedback after this seq")
     return {

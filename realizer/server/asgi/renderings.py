@@ -21,13 +21,12 @@ MOST_WAITING = 8  # of one address
 PATIENCE = 600.0  # s
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 NUMBER = re.compile(r"[0-9.]{1,12}")
-# Names of the query -> option of the command, and its form. No option that names a file can be given.
+# Options of the command that a query may have -> their form. None of them names a file.
 OPTIONS = {
-    "face": ("--face", NAME), "voice": ("--voice", NAME), "camera": ("--camera", NAME),
-    "light": ("--light", NAME), "background": ("--background", re.compile("#[0-9a-fA-F]{6}|transparent")),
-    "size": ("--size", re.compile("[0-9]{1,4}x[0-9]{1,4}")), "fps": ("--fps", NUMBER),
-    "at": ("--at", NUMBER), "seed": ("--seed", re.compile("-?[0-9]{1,18}")),
-    "language": ("--language", re.compile("[A-Za-z0-9-]{2,35}")), "morphs": ("--morphs", NAME),
+    "face": NAME, "voice": NAME, "camera": NAME, "light": NAME,
+    "background": re.compile("#[0-9a-fA-F]{6}|transparent"), "size": re.compile("[0-9]{1,4}x[0-9]{1,4}"),
+    "fps": NUMBER, "at": NUMBER, "seed": re.compile("-?[0-9]{1,18}"),
+    "language": re.compile("[A-Za-z0-9-]{2,35}"), "morphs": NAME,
 }  # fmt: skip
 # Exit status of the command -> status of the answer.
 STATUS = {1: HTTPStatus.UNPROCESSABLE_ENTITY, 2: HTTPStatus.BAD_REQUEST, 3: HTTPStatus.SERVICE_UNAVAILABLE}
@@ -85,16 +84,14 @@ class Renderings:
             if name not in OPTIONS:
                 words = f"wanted one of format, {', '.join(OPTIONS)}, got {name[:80]!r}"
                 raise JoinError(HTTPStatus.BAD_REQUEST, words)
-            flag, form = OPTIONS[name]
-            if not form.fullmatch(value):
-                raise JoinError(
-                    HTTPStatus.BAD_REQUEST, f"{name}: wanted a value of {flag}, got {value[:80]!r}"
-                )
+            if not OPTIONS[name].fullmatch(value):
+                words = f"{name}: wanted a value of --{name}, got {value[:80]!r}"
+                raise JoinError(HTTPStatus.BAD_REQUEST, words)
         drawn = OUTPUTS[suffix].picture_size is not None
         wanted: dict[str, str | None] = {**self._defaults, **asked}
         for name, choice in wanted.items():
             if choice is not None and (name != "light" or drawn or name in asked):
-                options += [OPTIONS[name][0], choice]
+                options += [f"--{name}", choice]
         return suffix, options
 
 
