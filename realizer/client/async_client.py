@@ -54,6 +54,7 @@ class Client:
         self._close_reason = ""
         self._reader = asyncio.create_task(self._read())
         self._request_lock = asyncio.Lock()
+        self._speeches: dict[str, Speech] = {}  # the latest of each id
 
     @property
     def session(self) -> str:
@@ -155,6 +156,7 @@ class Client:
             opening: composition, character and language, as in the message `speech`.
         """
         speech = Speech(id, opening, self.control, self.wait_for, self._check)
+        speech.earlier, self._speeches[id] = self._speeches.get(id), speech
         self._router.add_listener(speech.progress)
         return speech
 

@@ -98,8 +98,9 @@ class OpenSpeech(ABC):
         self._opening: dict[str, Any] | None = dict(opening)  # None: the service knows of it
         self._control = control
         self._wait = wait
-        self._closed = False
+        self._closed = self._stopped = False
         self._sending = asyncio.Lock()
+        self.earlier: OpenSpeech | None = None  # the speech that had the id before
 
     @abstractmethod
     async def close(self) -> None:
@@ -110,10 +111,17 @@ class OpenSpeech(ABC):
         """
 
     async def stop(self) -> None:
-        """Stop speaking at once."""
+        """Stop speaking at once. What is appended later is ignored; a new speech may have the same id."""
         if self._opening is not None:  # the service cannot stop what it does not know
             await self._speech(append="")
         await self._control("stop", blocks=[self.id])
+        await self._end_stopped()
+
+    async def _end_stopped(self) -> None:
+        """Close a speech that was cut off: until then the service ignores what has its id."""
+        if not self._closed:
+            self._closed = self._stopped = True
+            await self._speech(close=True)
 
     async def ended(self) -> BlockProgress:
         """Wait for the end of the speech; if it was cut off, `said` are the words that were spoken.
@@ -136,6 +144,9 @@ class OpenSpeech(ABC):
             await self.close()
 
     async def _speech(self, **fields: Any) -> None:
+        earlier, self.earlier = self.earlier, None
+        if earlier is not None and earlier.progress.is_finished:
+            await earlier._end_stopped()
         opening, self._opening = self._opening or {}, None
         await self._control("speech", id=self.id, **opening, **fields)
 
@@ -165,6 +176,8 @@ class Speech(OpenSpeech):
             ClientError: the speech was closed, by this client or by the service when another connection that
                 it came by ended; or this connection has ended.
         """
+        if self._stopped:
+            return
         self._check_open()
         self._check()  # text that waits to be sent would get lost
         self._unsent += text

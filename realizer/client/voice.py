@@ -49,6 +49,8 @@ class Voice(OpenSpeech):
             ClientError: the speech was refused or closed, or the connection has ended.
         """
         samples = samples_of(pcm)
+        if self._stopped:
+            return
         self._check_open()
         async with self._sending:
             self._sound = np.concatenate((self._sound, samples))
@@ -66,6 +68,8 @@ class Voice(OpenSpeech):
             ClientError: as `write`.
         """
         added = timed("words", words)
+        if self._stopped:
+            return
         self._check_open()
         last = max(self._sent / self._rate, self._words[-1]["start"] if self._words else 0.0)
         for word in added:

@@ -67,9 +67,10 @@ export class Voice {
 
   /** Stop speaking at once. */
   stop() {
-    this.#closed = true;
     if (!this.#clips) this.#speech({ append: "" }); // the service cannot stop what it does not know
     this.#send(JSON.stringify({ type: "stop", blocks: [this.id] }));
+    if (!this.#closed) this.#speech({ close: true }); // until then the service ignores what has its id
+    this.#closed = true;
   }
 
   /** Wait for the end: resolves with its feedback, which has `said` if it was interrupted; rejects if it is refused. */

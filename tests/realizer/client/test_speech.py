@@ -91,6 +91,25 @@ def test_speech_that_is_stopped_says_what_was_spoken() -> None:
     serving(test)
 
 
+@pytest.mark.parametrize("how", ["speech", "client"])
+def test_speech_may_have_the_id_of_one_that_was_stopped(how: str) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            first = client.speech("s1")
+            await first.append('A long story <sync id="m"/>about a town. ')
+            await first.until("m")
+            await (first.stop() if how == "speech" else client.control("stop"))
+            assert (await first.ended()).status == "INTERRUPTED"
+            await first.append("It is ignored. ")
+            async with client.speech("s1") as second:
+                await second.append("Hello.")
+            assert (await second.ended()).status == "DONE"
+            await first.close()  # changes nothing any more
+            assert not client.errors
+
+    serving(test)
+
+
 def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> None:
     async def test(url: str) -> None:
         async with connect(f"{url}?session=show") as client:
