@@ -10,11 +10,11 @@ import numpy as np
 
 from bml_schema import Block, SyncRef
 from realizer.playback.active_block import ActiveBlock, BlockMoment, Dependency
-from realizer.playback.block_store import ANTICIPATORS
-from realizer.playback.references import external_refs, references
+from realizer.playback.anticipation import anticipators_of
+from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim
 from realizer.scheduling import Member
-from realizer.scheduling.timing import Schedule
+from realizer.scheduling.timing import UNKNOWN, Schedule
 
 
 def dependencies(
@@ -228,7 +228,8 @@ def _member(playing: ActiveBlock, origin: float, now: float, is_moved: bool, is_
             for point, time in zip(points, times, strict=True)
             if playing.start + float(time) <= before
         }
-        if is_held and not playing.block[behaviour].references:
+        has_known_start = playing.start + float(times[0]) < now + UNKNOWN
+        if is_held and has_known_start and not playing.block[behaviour].references:
             passed[points[0]] = float(times[0]) + delay
         if passed:
             passed_times[behaviour] = passed
@@ -241,27 +242,3 @@ def _member(playing: ActiveBlock, origin: float, now: float, is_moved: bool, is_
         is_fixed=True,
         late=playing.schedule.late,
     )
-
-
-def anticipators_of(block: Block) -> set[str]:
-    return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
-
-
-def lead_time(playing: ActiveBlock, id: str, sync: str, now: float) -> float:
-    """Return the earliest possible time of an anticipated point, after the least times before it.
-
-    It is in seconds on the session clock; `now` if no later sync point refers to the point.
-    """
-    soonest = now
-    for node in playing.block.behaviours:
-        timing = playing.plan.timings.get(node.id)
-        for point, ref in node.syncs.items():
-            if timing is None or (ref.block, ref.behaviour, ref.sync) != (ANTICIPATORS, id, sync):
-                continue
-            times = playing.start + playing.schedule.times[node.id]
-            gaps = timing.preferred if timing.rigid else timing.least
-            last = timing.points.index(point)
-            if times[last] > now:
-                first = int(np.searchsorted(times, now, side="right"))  # the first point that has not passed
-                soonest = max(soonest, now + float(gaps[first:last].sum()) - ref.offset)
-    return soonest

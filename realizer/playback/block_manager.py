@@ -12,8 +12,8 @@ from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContex
 from realizer.core import work
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks, BlockRejectedError
+from realizer.playback.anticipation import anticipators_of, lead_time
 from realizer.playback.block_commands import CommandError, execute
-from realizer.playback.block_links import anticipators_of, lead_time
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
 from realizer.playback.feedback_events import (
@@ -275,16 +275,20 @@ class BlockManager:
         """
         self.advance(now, starts_before=now)
         tied = [p for p in self.blocks.active() if p.start < inf and id in anticipators_of(p.block)]
-        soonest = {sync: max([now, *(lead_time(p, id, sync, now) for p in tied)]) for sync in syncs}
+        groups = [[p, *self.timeline.linked_blocks(p, now)] for p in tied]
+        soonest = {sync: max([now, *(lead_time(g, id, sync, now) for g in groups)]) for sync in syncs}
         self.blocks.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
         if (beyond := len(self.blocks.anticipators) - ANTICIPATORS) > 0:
             wanted = {id}.union(*(anticipators_of(p.block) for p in self.blocks.active()))
             old = (name for name in self.blocks.anticipators if name not in wanted)
             self.blocks.drop_anticipators(set(islice(old, beyond)))
-        for playing in tied:
-            self.timeline.reschedule(
-                [playing, *self.timeline.linked_blocks(playing, now)], playing.start, now
-            )
+        for own, *others in groups:
+            if self.timeline.reschedule([own, *others], own.start, now):
+                continue
+            # What waits for the point must not wait for ever.
+            self.timeline.reschedule([own], own.start, now)
+            for other in others:
+                self.timeline.end_open(other, now)
 
     def update_speech_timing(self, block: str, behaviour: str, utterance: Utterance, now: float) -> bool:
         """Replace an utterance by one with its real timing while it is spoken; the rest of the block follows.

@@ -19,7 +19,7 @@ from realizer.playback.character import Character
 from realizer.playback.feedback_events import EventQueue, Reports, prediction, progress
 from realizer.playback.joint_planner import Arrival, JointPlanner
 from realizer.playback.resources import conflicts
-from realizer.scheduling.timing import Schedule, Warning
+from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.duration_fit import shortened
 from realizer.speech.utterance import Utterance
 
@@ -216,14 +216,22 @@ class BlockTimeline:
         """Return the other blocks that are solved together with one."""
         return affected_blocks(playing.block, self.blocks.active(), now, playing.dependencies)
 
-    def reschedule(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> None:
-        """Change the times of playing blocks to the best fit; if there is none, keep them and warn."""
+    def reschedule(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> bool:
+        """Change the times of playing blocks to the best fit.
+
+        If there is none, keep them, warn of each, and return False.
+        """
         why = self._retime_together(blocks, origin, now) if blocks else None
-        if why is None:
-            return
-        for playing in blocks:
+        for playing in blocks if why is not None else ():
             warning = Warning(playing.block.id, "IMPOSSIBLE_TO_SCHEDULE", f"stays as it was planned: {why}")
             self.reports.warn(warning, playing.block.character_id)
+        return why is None
+
+    def end_open(self, playing: ActiveBlock, now: float) -> None:
+        """End the behaviours of a block whose ends are not known."""
+        times = playing.schedule.times.items()
+        if ends := [b for b, t in times if playing.start + float(t[-1]) >= now + UNKNOWN]:
+            self.cut(playing, ends, now)
 
     def _retime_together(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> str | None:
         """Change the times of playing blocks to the best fit; if there is none, return why."""

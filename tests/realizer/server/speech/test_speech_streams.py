@@ -298,6 +298,45 @@ def test_speech_streams_do_not_wait_for_an_expression_up_to_their_end(text) -> N
     assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
 
 
+FACE, HEAD = 'faceLexeme id="f" lexeme="SMILE"', 'head id="f" lexeme="NOD"'
+LATE = [
+    f'<{FACE} start="turn:turn:start" end="turn:turn:end"/>',
+    f'<{FACE} end="turn:turn:end"/>',
+    f'<{FACE} start="0" end="turn:turn:end-0.5"/>',
+    f'<{FACE} start="0" relax="turn:turn:end"/>',
+    f'<{HEAD} stroke="turn:turn:end"/>',
+    f'<{FACE} end="g:end"/><head id="g" lexeme="NOD" end="turn:turn:end"/>',
+    f'<{FACE}/><constraint id="c"><synchronize ref="turn:turn:end"><sync ref="f:end"/></synchronize>'
+    "</constraint>",
+]
+
+
+@pytest.mark.parametrize("body", LATE)
+def test_advance_ends_what_is_tied_to_a_speech_that_is_closed_late(body) -> None:
+    driver = Talker()
+    driver.append("Hello there. ")
+    driver.send(f'<bml id="b">{body}</bml>')
+    driver.run(2.5)
+    driver.append(close=True)
+    client = driver.run(12)
+    at = times(client)
+    assert 2.5 <= at["turn:end"] < 2.7, "as soon as the motion can end"
+    assert at["b:end"] < 3.5
+    assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
+
+
+def test_advance_ends_a_speech_that_is_closed_too_late_for_others() -> None:
+    driver = Talker()
+    driver.append("Hello there. ")
+    driver.send(f'<bml id="b"><{FACE} start="turn:turn:end-3" end="turn:turn:end"/></bml>')
+    driver.run(2.5)
+    driver.append(close=True)
+    client = driver.run(12)
+    assert "b:end" in times(client)
+    assert times(client)["turn:end"] < 3.5
+    assert {f.type for f in client.feedback if isinstance(f, WarningFeedback)} == {"IMPOSSIBLE_TO_SCHEDULE"}
+
+
 def test_advance_predicts_the_end_once_it_is_known() -> None:
     driver = Talker()
     driver.append("One. Two.")
