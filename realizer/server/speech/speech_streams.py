@@ -158,9 +158,20 @@ class SpeechStreams:
         return any(map(self._has_next, self._speeches.values()))
 
     def with_links(self, block: Block) -> Block:
-        """Return a chunk's block with its predecessors, any other block with its `ID:ID:m` resolved."""
+        """Return a chunk's block with its predecessors, any other block with its `ID:ID:m` resolved.
+
+        If it interrupts a speech, it interrupts the chunks too.
+        """
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
+            cut = [
+                chunk
+                for id in block.interrupt
+                if id in self._speeches
+                for chunk in self._speeches[id].open_chunks
+            ]
+            if cut:
+                block = replace(block, interrupt=tuple(dict.fromkeys((*block.interrupt, *cut))))
             has_syncs = any(map(self._is_speech_sync, references(block)))
             return with_references(block, self._chunk_reference) if has_syncs else block
         own = self._player.blocks.find(speech.id)

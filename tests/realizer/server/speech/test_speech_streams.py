@@ -337,6 +337,20 @@ def test_advance_ends_a_speech_that_is_closed_too_late_for_others() -> None:
     assert {f.type for f in client.feedback if isinstance(f, WarningFeedback)} == {"IMPOSSIBLE_TO_SCHEDULE"}
 
 
+@pytest.mark.parametrize("target", ["turn", "turn,turn.2"])
+def test_with_links_interrupts_the_chunks_of_a_speech(target) -> None:
+    driver = Talker()
+    driver.append("This is a long story. And more. ")
+    driver.run(0.2)
+    names = f'xmlns:bmla="http://www.asap-project.org/bmla" bmla:interrupt="{target}"'
+    driver.send(f'<bml id="r" {names}><speech id="x" start="0"><text>Stop</text></speech></bml>')
+    client = driver.run(5)
+    at = times(client)
+    assert at["turn:end"] == at["r:x:start"] == pytest.approx(0.2)
+    assert "turn.2:start" not in at
+    assert not [f for f in client.feedback if isinstance(f, WarningFeedback)]
+
+
 def test_advance_predicts_the_end_once_it_is_known() -> None:
     driver = Talker()
     driver.append("One. Two.")
