@@ -2,7 +2,7 @@
 
 from realizer.charts.rows import draw_dropped, draw_row, height_of
 from realizer.charts.scale import Scale
-from realizer.charts.shapes import Picture, Text
+from realizer.charts.shapes import Box, Picture, Text
 from realizer.charts.timeline import BehaviourRow, Dropped, Gap, Point
 
 SCALE = Scale(0.0, 4.0, 1200.0)
@@ -26,6 +26,16 @@ def test_draw_row_writes_length_and_ratio_of_a_gap() -> None:
     assert "1.50 s, 150%" in row(Gap("start", "end", 1.5, 1.0, 0.0, 1.0))
     assert "1.00 s" in row(Gap("start", "end", 1.0, 1.0, 0.0, 1.0))
     assert "1.50 s" in row(Gap("start", "end", 1.5))
+
+
+def test_draw_row_frames_the_behaviour_from_its_first_point_to_its_last() -> None:
+    gaps = Gap("start", "stroke", 1.0), Gap("stroke", "end", 0.5)
+    points = tuple(Point(name, time, time) for name, time in (("start", 0.5), ("stroke", 1.5), ("end", 2.0)))
+    picture = Picture(1200)
+    draw_row(picture, SCALE, BehaviourRow("n", "head", 3, True, points, gaps), 0.0, 0.0, frozenset())
+    boxes = [(shape.x, shape.x + shape.width) for shape in picture.shapes if isinstance(shape, Box)]
+    at = {time: SCALE.x(time) for time in (0.5, 1.5, 2.0)}
+    assert boxes == [(at[0.5], at[1.5]), (at[1.5], at[2.0]), (at[0.5], at[2.0])]
 
 
 def test_draw_row_writes_less_in_short_gaps() -> None:

@@ -48,6 +48,12 @@ def test_voice_activity_does_not_depend_on_the_pieces(cuts) -> None:
     assert [turn for piece in pieces for turn in activity.add(piece)] == [turn for turn, _ in turns(TALK)]
 
 
+@pytest.mark.parametrize(("louder", "heard"), [(2.4, False), (4.2, True)])
+def test_voice_activity_hears_a_voice_that_is_a_little_louder_than_the_room(louder, heard) -> None:
+    found = turns(sound((3.0, 200), (1.0, 200 * louder), (1.5, 200)))
+    assert bool(found) is heard
+
+
 def test_voice_activity_gets_used_to_a_louder_background() -> None:
     fan = sound((0.5, 30), (20.0, 400))
     assert [turn for turn, _ in turns(fan)] == [Turn.BEGINS, Turn.PAUSES, Turn.ENDS]
