@@ -26,6 +26,7 @@ from realizer.client.message_router import (
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
 from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
+from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
@@ -52,6 +53,7 @@ class Client:
         self._received = asyncio.Condition()
         self._ended = False
         self._close_reason = ""
+        self._fault: Exception | None = None  # why a message could not be read
         self._reader = asyncio.create_task(self._read())
         self._request_lock = asyncio.Lock()
         self._speeches: dict[str, Speech] = {}  # the latest of each id
@@ -99,7 +101,7 @@ class Client:
             return self._router.answer()
 
     async def subscribe(self, /, stream: str, **fields: Any) -> dict[str, Any]:
-        """Subscribe to a stream (fap, au, arkit, mesh, audio, video, schedule) and return its description.
+        """Subscribe to a stream, a key of `welcome["capabilities"]["streams"]`, and return its description.
 
         Raises:
             ClientError: there is no such stream, or it is not available.
@@ -140,6 +142,7 @@ class Client:
 
         Raises:
             ClientError: the connection ended first.
+            RealizerError: a message of the service could not be read, which ends the connection.
         """
         async with self._received:
             await self._received.wait_for(lambda: condition() or self._ended)
@@ -358,12 +361,19 @@ class Client:
                     self._received.notify_all()
         except ConnectionClosed as closed:
             self._close_reason = closed.rcvd.reason if closed.rcvd is not None else ""
+        except Exception as fault:
+            self._fault = fault
+            await self._socket.close()
         finally:
             self._ended = True
             async with self._received:
                 self._received.notify_all()
 
     def _check(self) -> None:
+        if self._fault is not None:
+            # No ClientError, which is the usual end of an iteration.
+            text = f"a message of the service cannot be read: {self._fault!r}"
+            raise RealizerError(text) from self._fault
         if self._ended:
             raise ClientError(
                 "the connection has ended" + (f": {self._close_reason}" if self._close_reason else "")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from bml_schema.feedback import WarningFeedback
-from realizer.client import ClientError, connect
+from realizer.client import Client, ClientError, connect
+from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.face.load import load_face
 from realizer.protocol.wire import (
@@ -218,6 +219,29 @@ def test_client_raises_its_own_error_after_the_end_of_the_connection(say: Any) -
             assert caught.value.code == "connection"
 
     asyncio.run(run())
+
+
+def test_client_raises_to_all_that_wait_if_a_message_is_unreadable() -> None:
+    class Socket:
+        is_open = True
+
+        async def recv(self) -> bytes:
+            return b"no frame"
+
+        async def close(self) -> None:
+            self.is_open = False
+
+    async def run() -> None:
+        client = Client(socket := Socket(), "", connect)
+        waits = client.frames("fap"), client.feedback(), client.until_end("b")
+        tasks = [asyncio.ensure_future(anext(wait)) for wait in waits]
+        for result in await asyncio.gather(*tasks, return_exceptions=True):
+            assert isinstance(result, RealizerError)
+            assert "cannot be read: WireError('wanted a header of 16 bytes" in str(result)
+        assert not socket.is_open
+        await client.close()
+
+    asyncio.run(asyncio.wait_for(run(), LIMIT))
 
 
 def test_client_reads_a_mesh_by_the_present_face() -> None:
