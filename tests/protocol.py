@@ -41,6 +41,7 @@ PAGE = Path(__file__).parent.parent / "docs" / "protocol.md"
 BEGIN = "<!-- protocol: written by python -m tests.protocol -->"
 END = "<!-- end of protocol -->"
 SCRIPT = Path(__file__).parent.parent / "clients" / "javascript" / "src" / "frames.js"
+TYPES = SCRIPT.with_name("index.d.ts")
 SCRIPT_MARKS = ("// protocol: written by python -m tests.protocol", "// end of protocol")
 
 REQUESTS: dict[str, type[BaseModel]] = {
@@ -268,6 +269,20 @@ def constants() -> str:
     )
 
 
+def types() -> str:
+    """Return the names of streams for index.d.ts."""
+    names = " | ".join(json.dumps(row.name) for row in STREAMS.values() if row.encodings != ("text",))
+    return f"/** A stream whose messages are frames. */\nexport type StreamName = {names};\n"
+
+
+# file -> the text between its marks, and the marks
+PARTS = {
+    PAGE: (tables, BEGIN, END),
+    SCRIPT: (constants, *SCRIPT_MARKS),
+    TYPES: (types, *SCRIPT_MARKS),
+}
+
+
 def within(text: str, part: str, begin: str = BEGIN, end: str = END) -> str:
     """Return a text with *part* between its markers.
 
@@ -283,6 +298,6 @@ def within(text: str, part: str, begin: str = BEGIN, end: str = END) -> str:
 
 if __name__ == "__main__":
     FILE.write_text(render(), "utf-8")
-    PAGE.write_text(within(PAGE.read_text("utf-8"), tables()), "utf-8")
-    SCRIPT.write_text(within(SCRIPT.read_text("utf-8"), constants(), *SCRIPT_MARKS), "utf-8")
-    print(f"written: {FILE}, {PAGE}, {SCRIPT}")
+    for path, (part, *marks) in PARTS.items():
+        path.write_text(within(path.read_text("utf-8"), part(), *marks), "utf-8")
+    print("written:", *map(str, (FILE, *PARTS)), sep="\n")

@@ -21,13 +21,10 @@ from tests.protocol import (
     BEGIN,
     END,
     FILE,
-    PAGE,
+    PARTS,
     REPLIES,
     REQUESTS,
-    SCRIPT,
-    SCRIPT_MARKS,
     asyncapi,
-    constants,
     render,
     tables,
     within,
@@ -67,17 +64,13 @@ def test_the_file_is_current() -> None:
     assert FILE.read_text("utf-8") == render(), "run: python -m tests.protocol"
 
 
-def test_the_tables_are_current() -> None:
-    if not PAGE.is_file() or BEGIN not in (text := PAGE.read_text("utf-8")):
-        pytest.skip("no docs/protocol.md with tables of the protocol beside the tests")
-    assert within(text, tables()) == text, "run: python -m tests.protocol"
-
-
-def test_script_of_the_page_is_current() -> None:
-    if not SCRIPT.is_file():
-        pytest.skip("no sources of the page beside the tests")
-    text = SCRIPT.read_text("utf-8")
-    assert within(text, constants(), *SCRIPT_MARKS) == text, "run: python -m tests.protocol"
+@pytest.mark.parametrize("path", PARTS, ids=lambda path: path.name)
+def test_generated_part_of_a_file_is_current(path: Path) -> None:
+    if not path.is_file():
+        pytest.skip(f"no {path.name} beside the tests")
+    part, *marks = PARTS[path]
+    text = path.read_text("utf-8")
+    assert within(text, part(), *marks) == text, "run: python -m tests.protocol"
 
 
 def test_tables_go_between_their_markers_alone() -> None:

@@ -23,9 +23,14 @@ export interface StreamInfo {
   [field: string]: unknown;
 }
 
+// protocol: written by python -m tests.protocol
+/** A stream whose messages are frames. */
+export type StreamName = "fap" | "au" | "arkit" | "mesh" | "audio" | "video" | "schedule";
+// end of protocol
+
 /** A frame of a stream; `A` is the array of its values. */
 export interface Frame<A = ArrayLike<number>> {
-  stream: "fap" | "au" | "arkit" | "mesh" | "video" | "audio" | "schedule";
+  stream: StreamName;
   /** Number of the binary message; none in JSON. */
   kind?: number;
   /** Index of the character in binary frames, its id in JSON. */

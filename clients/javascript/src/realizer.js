@@ -132,8 +132,8 @@ export class Realizer {
   }
 
   /**
-   * Subscribe to fap, au, arkit, mesh, audio, video, schedule or feedback, also after a reconnect.
-   * @param {string} stream
+   * Subscribe to a stream, also after a reconnect.
+   * @param {string} stream its name in the table of docs/protocol.md
    * @param {object} [options] encoding, fps, character, ... of the message `subscribe`. With `ahead` the service sends
    *   frames up to that many seconds before their time, and each is passed on at its time
    * @param {function} [take] called with every frame
