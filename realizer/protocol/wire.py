@@ -33,7 +33,7 @@ class WireError(RealizerError):
 
 @dataclass(frozen=True, slots=True)
 class WireFrame(Generic[A]):
-    """A decoded binary message; a class of its own for each stream.
+    """A decoded binary message. Some streams have a class of their own, with more than the numbers.
 
     Attributes:
         character: index of the character, as in `subscribed`.
@@ -140,6 +140,7 @@ class SoundFrame(WireFrame[Int16]):
         return int(self.stream_info["rate"])
 
 
+# Those of other streams are WireFrames.
 _FRAMES: Mapping[str, type[WireFrame[Any]]] = {
     "fap": FapFrame, "au": AUFrame, "arkit": ArkitFrame,
     "mesh": MeshFrame, "video": PictureFrame, "audio": SoundFrame,
@@ -185,7 +186,7 @@ def unpack(message: bytes) -> WireFrame[Any]:
         raise WireError(f"wanted version {VERSION} of the frame header, got {version}")
     if kind not in KINDS:
         raise WireError(f"wanted a kind in {list(KINDS)}, got {kind}")
-    make = _FRAMES[KINDS[kind].name]
+    make = _FRAMES.get(KINDS[kind].name, WireFrame)
     return make(kind, frame, time, message[HEADER.size :], flags & 0xFF, bool(flags & FLUSH))
 
 

@@ -73,8 +73,8 @@ class Subscribed(Reply):
     index: int = Field(0, description="the low byte of the flags of binary frames")
     fps: float | None = None
     frame: int | None = None
-    ahead: float | None = Field(None, description="fap, au and arkit: as in `subscribe`, if it is above 0")
-    names: list[str] | None = Field(None, description="fap, au and arkit: names of the values")
+    ahead: float | None = Field(None, description="streams of numbers: as in `subscribe`, if it is above 0")
+    names: list[str] | None = Field(None, description="streams of numbers: names of the values")
     face: str | None = Field(
         None, description="mesh and video: name of the face; GET /faces/NAME has its mesh"
     )

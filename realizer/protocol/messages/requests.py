@@ -64,7 +64,7 @@ class Subscribe(Message):
         0.0,
         ge=0,
         le=2,
-        description="fap, au and arkit: seconds; above 0 a message has several rows, up to that long early",
+        description="streams of numbers: seconds; above 0 a message has several rows, up to that long early",
     )
     size: tuple[Side, Side] = Field((512, 512), strict=False, description="video: width, height in pixels")
     camera: str | None = Field(None, max_length=64, description="video: a camera; default: the service's")

@@ -259,7 +259,7 @@ class Broadcast:
         return self.frames_due(now), min(self.quiet_until, self.next_frame)
 
     def frames_due(self, now: float, *, is_reading: bool = False) -> list[Send]:
-        """Return the due frames of fap, au, arkit and mesh.
+        """Return the due frames of the streams of numbers and of mesh.
 
         Args:
             is_reading: whether the plan will soon change again: frames are taken back after that.

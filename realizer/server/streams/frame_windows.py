@@ -135,7 +135,7 @@ class FrameWindow:
     def rows_message(
         self, subscription: FrameSubscription, first: int, last: int, *, flush: bool
     ) -> str | bytes:
-        """Return the WebSocket message of the rows `first` .. `last` of fap, au or arkit."""
+        """Return the WebSocket message of the rows `first` .. `last` of a stream of numbers."""
         s = subscription
 
         def encode() -> str | bytes:
@@ -157,7 +157,7 @@ class FrameWindow:
         return message
 
     def rows(self, subscription: FrameSubscription, first: int, end: int) -> Float32 | Int32:
-        """Return the values of the frames `first` .. `end - 1` of fap, au or arkit, (n, k)."""
+        """Return the values of the frames `first` .. `end - 1` of a stream of numbers, (n, k)."""
         key = (subscription.stream, subscription.raw)
         if (rows := self._rows.get(key)) is None:
             rows = self._rows[key] = SOURCES[key[0]].rows(self.aus, self._mapping, key[1])
@@ -165,7 +165,7 @@ class FrameWindow:
         return part
 
     def _all_packed(self, subscription: FrameSubscription) -> tuple[bytes, int]:
-        """Return the binary messages of all frames of fap, au or arkit, joined, and the length of one."""
+        """Return the binary messages of all frames of a stream of numbers, joined, and the length of one."""
         stream, raw = subscription.stream, subscription.raw
         if (stream, raw) not in self._packed:
             rows = SOURCES[stream].rows(self.aus, self._mapping, raw)
@@ -253,7 +253,7 @@ class FrameTimeline:
 
 @dataclass(eq=False)
 class FrameSubscription:
-    """A subscription to fap, au, arkit or mesh."""
+    """A subscription to a stream of numbers, or to mesh."""
 
     stream: str
     encoding: str

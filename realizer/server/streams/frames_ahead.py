@@ -18,7 +18,7 @@ SHARE = 0.4
 
 @dataclass(eq=False)
 class AheadSubscription(FrameSubscription):
-    """A subscription to fap, au or arkit that gets several rows in a message, up to `ahead` seconds early.
+    """A subscription to a stream of numbers that gets several rows in a message, up to `ahead` seconds early.
 
     Attributes:
         final: number of the first row that can still be taken back: those before it were shown.

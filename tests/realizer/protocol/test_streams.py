@@ -26,7 +26,7 @@ def test_kinds_are_the_streams_that_have_one_in_order() -> None:
 
 def test_streams_are_the_literals_of_messages() -> None:
     assert get_args(StreamName) == tuple(STREAMS)
-    assert get_args(NumericStream) == tuple(SOURCES)
+    assert set(get_args(NumericStream)) == SOURCES.keys()
     assert set(get_args(Encoding)) == {name for row in STREAMS.values() for name in row.encodings}
 
 

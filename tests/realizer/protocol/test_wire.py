@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.protocol.streams import KINDS, STREAMS
+from realizer.protocol.streams import KINDS, STREAMS, Stream
 from realizer.protocol.wire import (
     ClipPiece,
     WireError,
@@ -76,6 +76,16 @@ def test_values_have_the_type_of_their_kind(stream, values) -> None:
     got = unpack(pack(stream, 0, 0.0, values.tobytes())).values
     assert got.dtype == values.dtype
     assert np.array_equal(got, values)
+
+
+def test_unpack_needs_no_class_of_a_stream_of_numbers(monkeypatch) -> None:
+    jaw = Stream("jaw", ("binary", "json"), ("fps",), kind=99, dtype="<f4", payload="float32")
+    monkeypatch.setitem(KINDS, 99, jaw)
+    message = bytearray(pack("au", 3, 0.12, np.array([0.5, 1], "<f4").tobytes()))
+    message[0] = 99
+    frame = replace(unpack(bytes(message)), stream_info={"names": ["open", "forward"]})
+    assert (frame.stream, frame.frame, frame.time) == ("jaw", 3, 0.12)
+    assert frame.named == {"open": 0.5, "forward": 1}
 
 
 def test_vertices_are_scaled_and_moved() -> None:

@@ -10,6 +10,7 @@ from realizer.protocol.wire import unpack
 from realizer.server.streams.frame_windows import SOURCES
 from tests.realizer.server.conftest import NOD
 
+NUMBERS = " or ".join(row.name for row in STREAMS.values() if row.numeric)
 FAP = {"type": "subscribe", "stream": "fap"}
 
 
@@ -219,7 +220,7 @@ def test_subscribe_to_feedback_refuses_an_unknown_element(driver) -> None:
     ("stream", "option", "words"),
     [
         ("fap", {"size": [64, 64]}, "wanted the stream video, got fap"),
-        ("mesh", {"ahead": 0.2}, "wanted the stream fap or au or arkit, got mesh"),
+        ("mesh", {"ahead": 0.2}, f"wanted the stream {NUMBERS}, got mesh"),
     ],
 )
 def test_subscribe_refuses_an_option_of_another_stream(driver, stream: str, option, words: str) -> None:

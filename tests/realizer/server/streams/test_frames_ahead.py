@@ -103,7 +103,6 @@ def test_ahead_takes_nothing_back_for_a_later_change(driver) -> None:
 def test_ahead_is_refused_for_other_streams(driver) -> None:
     (error,) = driver.send(subscribe("mesh")).of("error")
     assert error["where"] == "subscribe.ahead"
-    assert "fap or au or arkit" in error["message"]
     assert driver.send(subscribe(ahead=2.1)).of("error")[-1]["where"] == "subscribe.ahead"
     assert not driver.clients[1].of("subscribed")
 
