@@ -15,7 +15,7 @@ from bml_schema.node_schema import attribute, node
 from bml_schema.nodes import Behaviour
 from bml_schema.values import one_of
 from realizer.behaviours import pose_channels
-from realizer.behaviours.kind import BehaviourKind, timing_from_table
+from realizer.behaviours.kind import BehaviourKind, table_timing
 from realizer.face.load import folder_of
 from realizer.outputs import speech_spans
 from realizer.outputs.output import Output
@@ -35,15 +35,11 @@ class Wink(Behaviour):
     side: str = attribute(one_of("LEFT", "RIGHT"), default="LEFT")
 
 
-def timing(node, context):
-    return timing_from_table("faceLexeme", "RAISE_BROWS")
-
-
 def expand(node, times, context):
     return pose_channels.hold(pose_channels.columns({(43, node.side): 1.0}, 1.0), times, node.id)
 
 
-KINDS = (BehaviourKind(Wink, timing, expand),)
+KINDS = (BehaviourKind(Wink, table_timing("faceLexeme", "RAISE_BROWS"), expand),)
 
 # An output: `realizer realize hello.bml -o hello.words` writes a line for each word.
 

@@ -107,9 +107,9 @@ def timing_from_table(element: str, variant: str = "") -> Timing:
     return from_gaps(row.points, row.gaps)
 
 
-def table_timing(element: str) -> Callable[[Any, PlanningContext], Timing]:
-    """Return the function `timing` of a behaviour whose timing is always that of its element."""
-    return lambda node, context: timing_from_table(element)
+def table_timing(element: str, variant: str = "") -> Callable[[Any, PlanningContext], Timing]:
+    """Return the function `timing` of a behaviour whose timing is always that of one row of the table."""
+    return lambda node, context: timing_from_table(element, variant)
 
 
 @lru_cache(maxsize=1000)

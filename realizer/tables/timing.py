@@ -41,9 +41,7 @@ def gaps(element: str, variant: str = "") -> Gaps:
     known = all_gaps()
     row = known.get(f"{element}.{variant.upper()}") or known.get(element)
     if row is None:
-        raise TableError(
-            f"timing.toml has no row [{element}]: add one, or use timing_from_table with another element"
-        )
+        raise TableError(f"timing.toml has no row [{element}]: add one, or use the timing of another element")
     return row
 
 

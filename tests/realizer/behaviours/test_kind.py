@@ -59,5 +59,6 @@ def test_from_gaps_shares_arrays_that_cannot_be_written() -> None:
         from_gaps(row.points, row.gaps).preferred[0] = 1.0
 
 
-def test_table_timing_is_that_of_the_element() -> None:
-    assert table_timing("blink")(None, PlanningContext()) is timing_from_table("blink")
+@pytest.mark.parametrize("row", [("blink",), ("faceLexeme", "RAISE_BROWS")])
+def test_table_timing_is_that_of_the_row(row: tuple[str, ...]) -> None:
+    assert table_timing(*row)(None, PlanningContext()) is timing_from_table(*row)

@@ -32,7 +32,7 @@ def test_gaps_have_the_points_of_the_element(name: str) -> None:
 
 def test_gaps_say_what_to_do_about_an_element_without_a_row() -> None:
     with pytest.raises(
-        TableError, match=r"^timing\.toml has no row \[wink\]: add one, or use timing_from_table"
+        TableError, match=r"^timing\.toml has no row \[wink\]: add one, or use the timing of another"
     ):
         gaps("wink", "LEFT")
 
