@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import html
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from difflib import SequenceMatcher
 from fractions import Fraction
 from itertools import pairwise, zip_longest
 from typing import TYPE_CHECKING, Any
 
 from realizer.outputs import speech_spans
 from realizer.outputs.speech_spans import Span
+from realizer.speech.words import words_in
 
 if TYPE_CHECKING:
     from realizer.playback.scheduled_speech import ScheduledSpeech
     from realizer.realization import Realization
 
 # As usual for subtitles: about 40 letters a line, and a new line at a pause of the voice.
-MOST, ENOUGH = 42, 20  # letters; a line that has enough ends at a short pause
+MOST, ENOUGH = 42, 20  # letters; a line that has enough, or a sentence, ends at a short pause
 REST, LONG_REST = 0.12, 0.6  # s
+SENTENCE = re.compile(r"[.!?…。！？][^\w\s]*$")
 LINGER = 0.4  # s that a line stays after its last word
 CLOCK = Fraction(1, 1000)
 # The encoder of MP4's subtitles takes their style from this.
@@ -46,17 +51,40 @@ def captions(realization: Realization) -> tuple[Span, ...]:
 def _lines(speaking: ScheduledSpeech) -> Iterator[Span]:
     """Yield the lines of an utterance; each stays a little longer, but not into the next."""
     lines: list[Span] = []
-    for word in speech_spans.words(speaking):
+    for word in _written(speaking):
         if lines:
             line = lines[-1]
-            rest, text = word.start - line.end, f"{line.text} {word.text}"
-            if len(text) <= MOST and rest < (REST if len(line.text) >= ENOUGH else LONG_REST):
-                lines[-1] = Span(line.start, word.end, text)
+            text, shown = f"{line.text}{word.text}".rstrip(), line.text.rstrip()
+            ends = len(shown) >= ENOUGH or SENTENCE.search(shown)
+            if len(text) <= MOST and word.start - line.end < (REST if ends else LONG_REST):
+                lines[-1] = Span(line.start, word.end, line.text + word.text)
                 continue
         lines.append(word)
     for line, after in zip_longest(lines, lines[1:]):
         end = line.end + LINGER
-        yield Span(line.start, end if after is None else min(end, max(after.start, line.end)), line.text)
+        end = end if after is None else min(end, max(after.start, line.end))
+        yield Span(line.start, end, line.text.rstrip())
+
+
+def _written(speaking: ScheduledSpeech) -> Iterator[Span]:
+    """Yield the words with the punctuation and the blank between them and the next.
+
+    A word that is not in the text of the document, such as one of an alias, has only a blank.
+    """
+    words = list(speech_spans.words(speaking))
+    text = " ".join(str(speaking.text or "").split())
+    places = list(words_in(text))
+    firsts = [0]  # where each word begins, with signs before it
+    for (word, place), (_, after) in pairwise(places):
+        signs = re.search(r"(?<=\s)\S*$", text[place + len(word) : after])
+        firsts.append(after - len(signs[0]) if signs else after)
+    parts = [text[first:end] for first, end in pairwise([*firsts, len(text)])]
+    same = SequenceMatcher(None, [w.text for w in words], [word for word, _ in places], autojunk=False)
+    found = {
+        block.a + k: parts[block.b + k] for block in same.get_matching_blocks() for k in range(block.size)
+    }
+    for number, span in enumerate(words):
+        yield replace(span, text=found.get(number, f"{span.text} "))
 
 
 class Track:

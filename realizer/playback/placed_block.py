@@ -8,7 +8,7 @@ from itertools import chain
 
 import numpy as np
 
-from bml_schema import Block, SyncRef
+from bml_schema import Block, Speech, SyncRef
 from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.curves import crossfade
 from realizer.animation.idle.prosody import KnownMotion
@@ -91,7 +91,11 @@ class PlacedBlock:
             if sound is not None:
                 is_complete = end - begin >= sound.duration - 1e-6
                 self.speech[behaviour] = ScheduledSpeech(
-                    begin, float("inf") if is_complete else end, sound, self.character
+                    begin,
+                    float("inf") if is_complete else end,
+                    sound,
+                    self.character,
+                    text=node.text if isinstance(node, Speech) else None,
                 )
 
     def unfinished(self, now: float) -> set[str]:

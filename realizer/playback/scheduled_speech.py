@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bml_schema import SpeechText
 from realizer.animation.channel import Gain
 from realizer.animation.curves import gain_at
 from realizer.core.array_types import Float32, Int16
@@ -29,6 +30,7 @@ class ScheduledSpeech:
     utterance: Utterance
     character: int
     gains: tuple[Gain, ...] = ()
+    text: SpeechText | None = None  # as it is written in the document
 
     @property
     def is_heard(self) -> bool:

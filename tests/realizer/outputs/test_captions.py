@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from bml_schema import SpeechText
+from realizer.offline import realize
 from realizer.outputs.captions import MOST, Track, captions
 from realizer.outputs.speech_spans import Span
 from realizer.speech.utterance import Word
@@ -38,6 +40,27 @@ def test_captions_break_lines_at_pauses_and_when_full(realization):
     assert all(before.end <= after.start for before, after in pairwise(found))
     assert found[0].start == 1.0
     assert found[-1].end == pytest.approx(5.9)  # a little longer than it is heard
+
+
+def test_captions_have_the_punctuation_of_the_text_and_end_at_sentences():
+    text = """Hello there. How are you? He said, "It is Dr. Smith \u2013 not 50% \u2013 of <sync id="m"/>all
+        'em!" (Yes.) 你好，世界。"""
+    played = realize(f'<bml id="b"><speech id="s"><text>{text}</text></speech></bml>', voice="silent")
+    assert [line.text for line in captions(played)] == [
+        "Hello there.",
+        "How are you?",
+        'He said, "It is Dr.',
+        "Smith \u2013 not 50% \u2013 of all 'em!\"",
+        "(Yes.)",
+        "你好，世界。",
+    ]
+
+
+def test_captions_of_words_that_are_not_in_the_text_have_only_blanks(realization):
+    found = spoken(realization, (0, 1, "World"), (1, 2, "Wide"), (2, 3, "Web"), (3, 4, "works"))
+    text = SpeechText(parts=("The WWW, works?",))
+    speeches = tuple(replace(speech, text=text) for speech in found.speeches)
+    assert [line.text for line in captions(replace(found, speeches=speeches))] == ["World Wide Web works?"]
 
 
 def test_captions_have_lines_of_one_long_word(realization):
