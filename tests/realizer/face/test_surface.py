@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
+from realizer.face.mesh_geometry import grid
 from realizer.face.model import Face
 from realizer.face.surface import face_scale, normals, quantise
 
@@ -23,6 +26,18 @@ def test_normals_have_length_one_and_point_outwards(face: Face) -> None:
     assert np.allclose(np.linalg.norm(ups, axis=1), 1, atol=1e-4)
     assert ups[face.feature_points["9.3"], 2] > 0.7
     assert ups[face.feature_points["11.4"], 1] > 0.7
+
+
+def test_normals_do_not_depend_on_the_diagonals_of_quads(face: Face) -> None:
+    """Along a straight lip with mirrored halves they are alike."""
+    high, forward = np.array([[0, 4, 7, 9, 10, 14], [0, 3, 4, 4, 1, -1]]) / 1000
+    x = np.arange(-4, 5) * 0.006
+    at = np.stack([np.tile(x, 6), np.repeat(high, 9), np.repeat(forward, 9)], axis=1)
+    half = grid(6, 9)[at[grid(6, 9), 0].max(axis=1) < 1e-6]
+    other = half + 8 - 2 * (half % 9)
+    lip = replace(face, parts={}, vertices=np.float32(at), triangles=np.concatenate([half, other[:, ::-1]]))
+    ups = normals(lip, lip.vertices[None])[0].reshape(6, 9, 3)[1:-1, 1:-1]
+    assert np.allclose(ups, ups[:, :1], atol=1e-5)
 
 
 def test_quantised_vertices_come_back_within_a_step(face: Face) -> None:

@@ -2,6 +2,8 @@
 import { BufferAttribute, BufferGeometry } from "three";
 import { Matrix } from "./sparse.js";
 
+const CLOTH = 4; // a row of realizer/tables/surfaces.toml
+
 const smooth = (x) => x * x * (3 - 2 * x);
 
 export class Head {
@@ -13,6 +15,7 @@ export class Head {
     const count = this.places.rows.length - 1;
     const coarse = groups.map(({ triangles }) => coarser(triangles, this.places));
     this.triangles = coarse.flatMap((mine) => [...mine].map((vertex) => this.places.single(vertex)));
+    this.shares = coarse.flatMap((mine, k) => [...sharesOf(mine, attributes.POSITION.array, groups[k].kind === CLOTH)]);
     this.vertices = new Float32Array(3 * extras.vertices);
     this.normals = new Float32Array(3 * extras.vertices);
     // Hair has no triangles in the stream: it is drawn as it is.
@@ -49,19 +52,20 @@ export class Head {
     if (this.folds) this.fold();
   }
 
-  // Write the unit normals of the stream's vertices, of triangles by their size.
+  // Write the unit normals of the stream's vertices, as realizer/face/surface.py.
   turn() {
-    const { vertices: v, normals: n, triangles } = this;
+    const { vertices: v, normals: n, triangles, shares } = this;
     n.fill(0);
     for (let t = 0; t < triangles.length; t += 3) {
       const [a, b, c] = [3 * triangles[t], 3 * triangles[t + 1], 3 * triangles[t + 2]];
       const [px, py, pz] = [v[b] - v[a], v[b + 1] - v[a + 1], v[b + 2] - v[a + 2]];
       const [qx, qy, qz] = [v[c] - v[a], v[c + 1] - v[a + 1], v[c + 2] - v[a + 2]];
       const [x, y, z] = [py * qz - pz * qy, pz * qx - px * qz, px * qy - py * qx];
-      for (const corner of [a, b, c]) {
-        n[corner] += x;
-        n[corner + 1] += y;
-        n[corner + 2] += z;
+      for (let k = 0; k < 3; k++) {
+        const [corner, share] = [3 * triangles[t + k], shares[t + k]];
+        n[corner] += share * x;
+        n[corner + 1] += share * y;
+        n[corner + 2] += share * z;
       }
     }
     for (let i = 0; i < n.length; i += 3) {
@@ -103,6 +107,16 @@ export class Head {
     this.ups.timesNumbers(amounts, this.attributes.fold.array, this.wanted);
     this.attributes.fold.needsUpdate = true;
   }
+}
+
+// By how much each corner's normal follows its triangle: by the two sides at the corner, 1 mm at least; in cloth, by its size.
+function sharesOf(triangles, at, cloth) {
+  const side = (a, b) => Math.max(1e-6, [0, 1, 2].reduce((sum, k) => sum + (at[3 * a + k] - at[3 * b + k]) ** 2, 0));
+  return Float32Array.from(triangles, (corner, i) => {
+    if (cloth) return 1;
+    const first = i - (i % 3);
+    return 1 / (side(corner, triangles[first + ((i + 1) % 3)]) * side(corner, triangles[first + ((i + 2) % 3)]));
+  });
 }
 
 // The triangles of cards, and for each corner its share in the direction in which v grows, as in face/drawn_mesh.py.
