@@ -18,7 +18,7 @@ from realizer.facebuild.hair.strands import unit
 from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.scalp import Scalp
 
-BEARD_CARDS = 1600  # cards of a full beard
+BEARD_CARDS = 1900  # cards of a full beard
 LONG, WIDE = 0.024, 0.0046  # m, of a card on the chin of a full beard
 SHORT = 0.006  # m, of the shortest beard
 SEGMENTS = 2
@@ -50,7 +50,7 @@ def beard(
     # The strip between nose and lip is narrow, and hardly any triangle lies in it wholly.
     middle = at[triangles].mean(axis=1)
     lip = (middle[:, 1] > points["2.2"][1]) & (np.abs(middle[:, 0]) < points["8.3"][0] + 0.008)
-    low = np.where(lip, 0.15, 0.3)
+    low = np.where(lip, 0.15, 0.2)
     weight = area * np.where(lip, 5, 1) * smooth(where[triangles].mean(axis=1), low, low + 0.35)
     # Evenly: cards by chance alone would leave holes.
     even = (np.arange(BEARD_CARDS) + rng.uniform(0, 1, BEARD_CARDS)) / BEARD_CARDS
@@ -90,7 +90,7 @@ def beard(
     )
     return ribbons(
         places, np.repeat(ups[:, None], SEGMENTS + 1, axis=1), width,
-        np.where(thin, "wire", "tuft"), tint, light, 0.15,
+        np.where(thin, "tuft", "crew"), tint, light, 0.15,
         (corners, np.repeat(shares[:, None], SEGMENTS + 1, axis=1)),
     )  # fmt: skip
 

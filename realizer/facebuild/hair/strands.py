@@ -172,10 +172,13 @@ def _push(scalp: Scalp, style: Style, at: Float64, layer: Float64, rise: Float64
     height = thickness(scalp, style, at) * (1 - style.depth + style.depth * layer)
     height = np.minimum(rise, height).clip(LEAST)
     height = height * (1 - hang) + np.maximum(style.body * (0.4 + 0.6 * layer), height) * hang
-    height += style.heavy * EAR * smooth(scalp.off_ear(at), 0.030, -0.004)
+    ear = style.heavy * smooth(scalp.off_ear(at), 0.030, -0.004)
+    height += EAR * ear
     push = np.maximum(height - lift, (height - lift) * (1 - hang)).clip(-STEP / 2, STEP / 2)
-    skull = unit(at - scalp.middle) * smooth(at[:, 1], -0.07, -0.03)[:, None]
-    return unit(ups + 2 * style.heavy * skull) * np.where(scalp.distance(at) < NEAR, push, 0)[:, None]
+    skull = unit(at - scalp.middle) * np.maximum(style.heavy * smooth(at[:, 1], -0.07, -0.03), ear)[:, None]
+    # An ear's own normals would part the hair over it.
+    way = unit(ups * (1 - ear)[:, None] + 2 * skull)
+    return way * np.where(scalp.distance(at) < NEAR, push, 0)[:, None]
 
 
 def _is_wrong(scalp: Scalp, style: Style, places: Float64) -> Bool:

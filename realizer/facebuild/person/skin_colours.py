@@ -70,9 +70,12 @@ def beard(ground: Ground, lips: Lips) -> Float64:
         [0, 0.016, corner[0] + 0.006, 0.75 * lobe[0], lobe[0]],
         [under_nose[1] + 0.004, under_nose[1] + 0.002, corner[1] + 0.006, corner[1] + 0.018, lobe[1] + 0.045],
     )
-    face = smooth(at[:, 1] - line, 0.004, -0.008) * smooth(at[:, 1] - chin[1], -0.045, -0.010)
-    before = smooth(at[:, 2] - lobe[2], 0.0, 0.012)
-    return np.asarray(face * before * (1 - lips.lips) * ground.body)
+    # It ends a little below the jaw, and comes nearer to the lower lip than to the upper one.
+    low = np.interp(at[:, 2], [lobe[2], chin[2] - 0.030], [lobe[1] - 0.034, chin[1] - 0.026])
+    face = smooth(at[:, 1] - line, 0.004, -0.008) * smooth(at[:, 1] - low, -0.012, 0.010)
+    before = smooth(at[:, 2] - lobe[2], -0.002, 0.012)
+    bare = np.where(lips.is_upper, lips.lips, smooth(lips.away, 0.006, 0.001))
+    return np.asarray(face * before * (1 - bare) * ground.body)
 
 
 # Metres behind the lips that the mouth's lining is darkest from; how much light reaches it there, and right

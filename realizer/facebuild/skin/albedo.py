@@ -164,7 +164,7 @@ def _beard(skin: Skin, out: Float32) -> None:
     where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
     where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0.7 * grown, 1.2)
     hair = _vector(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
-    shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.2, 0.6) * grown * 0.55)[:, None]
+    shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.3, 0.8) * grown * 0.65)[:, None]
     out += shade * (hair * (0.6 + 0.15 * grown) + (1 - grown) * _vector([30, 36, 40]) - out)
     _dots(skin, out, "stubble", np.clip(where * 1.6, 0, 1) * min(1.0, amount * 2), hair)
 

@@ -120,6 +120,7 @@ def _around_mouth(skin: Skin, row: dict[str, Any]) -> tuple[Float32, Float32]:
 
 CAVITY = 1500.0  # part of the light that a metre of depth below the surroundings takes away
 CAVITY_AROUND = 6.0  # texels of these surroundings
+EVEN, MATT = 0.6, 0.35  # brightness of skin, 0..1, below which it gets rougher, and by how much
 WET, TEARS = 0.35, 0.14  # roughness of the lining of the mouth, and of the lids' edges
 
 
@@ -138,7 +139,9 @@ def _roughness(skin: Skin) -> Float32:
     lids = skin.around("3.1", "3.2", "3.3", "3.4", radii=(0.020, 0.010, 0.02))
     out = row["cheek"] + (row["oily"] - row["cheek"]) * skin.oily()
     out = out + (row["lids"] - out) * np.clip(lids, 0, 1) * 0.6
-    out = out + 0.06 * skin.look.age
+    # On dark skin the same highlight would look wet.
+    dark = max(0.0, EVEN - float(np.mean(skin.recipe.colours["skin"])) / 255)
+    out = out + 0.06 * skin.look.age + MATT * dark
     out = out + row["fine"] * (skin.noise(0.0012, 80) + 0.5 * skin.noise(0.005, 81))
     out = out + (row["lips"] + 0.03 * skin.noise(0.0010, 82, skin.red) - out) * skin.red
     wet = smooth(skin.ring, 2.0, 1.0)
