@@ -138,7 +138,7 @@ def test_emotion_by_valence_and_arousal_is_a_place(play) -> None:
         asked(play(f'<own:emotion id="e" name="joy" {AT}/>'), 1.0), abs=0.02
     )
     half = " ".join(f'{name}="{value / length / 2:.6f}"' for name, value in away.items())
-    assert asked(play(f'<own:emotion id="e" {half} {AT}/>'), 1.0)["6L"] == pytest.approx(0.4, abs=0.02)
+    assert asked(play(f'<own:emotion id="e" {half} {AT}/>'), 1.0)["6L"] == pytest.approx(0.5, abs=0.02)
     middle = play(f'<own:emotion id="e" valence="0" arousal="0" {AT}/>')
     assert (middle.warnings, middle.aus(1.0)) == ([], {})
     resting = play(f'<own:emotion id="e" valence="0" arousal="-1" {AT}/>')
