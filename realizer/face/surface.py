@@ -32,9 +32,8 @@ def normals(face: Face, vertices: Any) -> Float32:
         (bx, by, bz), (cx, cy, cz) = second, third
         x, y, z = corners @ (by * cz - bz * cy), corners @ (bz * cx - bx * cz), corners @ (bx * cy - by * cx)
         length = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-20)
-        np.divide(x, length, out=ups[:, 0])
-        np.divide(y, length, out=ups[:, 1])
-        np.divide(z, length, out=ups[:, 2])
+        for column, part in enumerate((x, y, z)):
+            np.divide(part, length, out=ups[:, column])
     return out
 
 
@@ -60,12 +59,11 @@ def _corners(face: Face) -> tuple[Any, Any]:
     """Return the sparse weights (n_vertices, n_triangles), and the triangles' three columns."""
     from scipy.sparse import csr_matrix
 
-    m = len(face.triangles)
     at = face.vertices[face.triangles]
     squares = np.maximum(((np.roll(at, -1, axis=1) - at) ** 2).sum(axis=2), SHORT**2)
     weights = 1 / (squares * np.roll(squares, 1, axis=1))
     first, last = face.parts.get(CLOTH, (0, 0))
     weights[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)] = 1
-    columns = np.repeat(np.arange(m, dtype=np.int32), 3)
-    matrix = csr_matrix((weights.ravel(), (face.triangles.ravel(), columns)), (len(face.vertices), m))
+    columns = np.repeat(np.arange(len(at), dtype=np.int32), 3)
+    matrix = csr_matrix((weights.ravel(), (face.triangles.ravel(), columns)), (len(face.vertices), len(at)))
     return matrix, tuple(np.ascontiguousarray(face.triangles.T))

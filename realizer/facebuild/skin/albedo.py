@@ -30,7 +30,7 @@ def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     out = skin.texels.spread(skin.part.colours)
     _mottle(skin, out)
     out *= (1 - pores)[:, None]
-    out *= 1 - lines[:, None] * _vector([0.10, 0.17, 0.20])
+    out *= 1 - lines[:, None] * Skin.float([0.10, 0.17, 0.20])
     _vessels(skin, out)
     _spots(skin, out)
     _lips(skin, out)
@@ -42,10 +42,6 @@ def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     return np.clip(out, 0, 255)
 
 
-def _vector(values: Any) -> Float32:
-    return np.asarray(values, np.float32)
-
-
 def _mottle(skin: Skin, out: Float32) -> None:
     number = 10
     for name in ("blood", "melanin"):
@@ -55,7 +51,7 @@ def _mottle(skin: Skin, out: Float32) -> None:
             for k, (length, share) in enumerate(zip(row["lengths"], row["share"], strict=True))
         )
         number += 2
-        out *= 1 + np.clip(change, -0.08, 0.08)[:, None] * _vector(row["tint"])
+        out *= 1 + np.clip(change, -0.08, 0.08)[:, None] * Skin.float(row["tint"])
     row = skin.table["speckle"]
     out *= (1 + row["share"] * skin.noise(row["length"], number))[:, None]
 
@@ -73,7 +69,7 @@ def _vessels(skin: Skin, out: Float32) -> None:
         length, number = row["length"], skin.seed + len(name)
         line = skin.within(where > 0.01, partial(ridges, length=length, seed=number))
         line = line * np.clip(0.5 + 0.6 * skin.noise(length * 2, 20 + len(name)), 0, 1)
-        out *= 1 - (line * np.clip(where, 0, 1))[:, None] * (1 - _vector(row["tint"]))
+        out *= 1 - (line * np.clip(where, 0, 1))[:, None] * (1 - Skin.float(row["tint"]))
 
 
 def _spots(skin: Skin, out: Float32) -> None:
@@ -89,7 +85,7 @@ def _spots(skin: Skin, out: Float32) -> None:
         found, radius = skin.mark(name, where, number)
         share = skin.texels.stamp(found, radius, partial(_disc, firm))
         share *= np.clip(0.75 + 0.25 * skin.noise(EDGE, 34, share), 0.2, 1)
-        out *= 1 - share[:, None] * (1 - _vector(skin.table[name]["tint"]))
+        out *= 1 - share[:, None] * (1 - Skin.float(skin.table[name]["tint"]))
 
 
 def _disc(firm: float, away: Any) -> Any:
@@ -118,7 +114,7 @@ def _lips(skin: Skin, out: Float32) -> None:
     # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
     tone = (1 - 0.06 * upper) * (1 - 0.05 * smooth(skin.ring, 5, 1)) * (1 - row["dark"] * crease(skin))
     tone = tone * (1 + 0.03 * skin.noise(0.0016, 42, skin.red))
-    colour = _vector(skin.recipe.colours["lips"]) * skin.float(tone)[:, None]
+    colour = Skin.float(skin.recipe.colours["lips"]) * skin.float(tone)[:, None]
     out += share[:, None] * (colour - out)
     # A pale line around the red.
     rim = np.exp(-(((skin.ring - 8.0) / 0.7) ** 2)) * skin.dry
@@ -130,21 +126,21 @@ def _margins(skin: Skin, out: Float32) -> None:
     edge, caruncle = skin.margins()
     # Between the wet edge of a lid and its lashes the skin is as pale as before.
     share = np.maximum(0.45 * smooth(edge, 0.35, 0.9), 0.7 * caruncle)
-    out += skin.float(share)[:, None] * (_vector(skin.recipe.colours["corner"]) * 0.92 - out)
+    out += skin.float(share)[:, None] * (Skin.float(skin.recipe.colours["corner"]) * 0.92 - out)
     rooted = np.zeros(len(skin.person.ground.at))
     for lid in skin.lids:
         for row, share in zip((lid.lower, lid.upper), LASHES[::-1], strict=True):
             rooted[row[2:-1]] = share
     roots = skin.field(rooted)
     out += skin.float(roots * smooth(edge, 0.15, 0.6) * (1 - caruncle))[:, None] * (
-        _vector(skin.recipe.colours["lashes"]) - out
+        Skin.float(skin.recipe.colours["lashes"]) - out
     )
 
 
 def _brows(skin: Skin, out: Float32) -> None:
     ground, look = skin.person.ground, skin.look
     points = {name: ground.point(name) for name in ground.points}
-    colour = _vector(0.9 * tint_of(skin.recipe.colours["brows"], look))
+    colour = Skin.float(0.9 * tint_of(skin.recipe.colours["brows"], look))
     for side in (1, -1):
         line = Brow(points, side, look)
         near = np.abs(skin.at[:, :2] * [side, 1] - [points["4.3"][0], points["4.3"][1]]) < NEAR
@@ -163,9 +159,9 @@ def _beard(skin: Skin, out: Float32) -> None:
         return
     where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
     where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0.7 * grown, 1.2)
-    hair = _vector(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
+    hair = Skin.float(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
     shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.3, 0.8) * grown * 0.65)[:, None]
-    out += shade * (hair * (0.6 + 0.15 * grown) + (1 - grown) * _vector([30, 36, 40]) - out)
+    out += shade * (hair * (0.6 + 0.15 * grown) + (1 - grown) * Skin.float([30, 36, 40]) - out)
     _dots(skin, out, "stubble", np.clip(where * 1.6, 0, 1) * min(1.0, amount * 2), hair)
 
 
@@ -188,7 +184,7 @@ def _scalp(skin: Skin, out: Float32) -> None:
         return shadow(scalp, style, at)
 
     where = np.clip(skin.texels.broad(under) * (1 + 40 * ragged), 0, 1)
-    hair = _vector(colour_of(style, skin.recipe.colours["hair"]))
+    hair = Skin.float(colour_of(style, skin.recipe.colours["hair"]))
     out += (0.45 * where)[:, None] * (hair - out)
     _dots(skin, out, "roots", where, hair)
 
