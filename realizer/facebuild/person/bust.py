@@ -67,7 +67,7 @@ def assemble(person: Person, lips: Lips, lids: list[Lid], recipe: Recipe) -> lis
     eyes = zip(("left_eye", "right_eye"), (29, 30), (1, -1), person.balls, strict=True)
     made += [eyeball(name, *ball, EYES, dilation, side) for name, dilation, side, ball in eyes]
     made += _teeth(person, recipe)
-    made += [_tongue(person, recipe), tears(ground, lids, person.balls)]
+    made += [_tongue(person, recipe), tears(ground, lids, person.balls, look["corner"])]
     made.append(clothing.shirt(body, at, dressed, look["shirt"]))
     if (figures := glasses_of(recipe.glasses)) is not None:
         made.append(glasses(figures, made[0].vertices, list(person.balls), [points["10.1"], points["10.2"]]))

@@ -168,14 +168,17 @@ TALL = 0.00045  # m up the eye
 # From the lid's edge up the eye: share of the way, and of the edge's distance from the eye; tears are hollow.
 TEAR_RINGS = (0.0, 1.0), (0.4, 0.3), (1.0, 0.0)
 THIN = 0.00015  # m before the eye at the top
-TINT = np.array([204.0, 172, 164])  # the lid's pink seen through
+DARK = 0.78  # brightness of tears beside the pink of the eye's corner, which is seen through them
 
 
-def tears(ground: Ground, lids: Sequence[Lid], eyes: Sequence[tuple[Float64, float]]) -> Part:
+def tears(
+    ground: Ground, lids: Sequence[Lid], eyes: Sequence[tuple[Float64, float]], pink: Sequence[float]
+) -> Part:
     """Return the strips of both eyes, which follow the edges of the lids.
 
     Args:
         eyes: centre (3,) and radius of each ball.
+        pink: sRGB, of the eye's corner.
     """
     places: list[Float64] = []
     sources: list[int] = []
@@ -196,7 +199,7 @@ def tears(ground: Ground, lids: Sequence[Lid], eyes: Sequence[tuple[Float64, flo
         places.append(np.concatenate(rows))
         sources += lid.lower * len(TEAR_RINGS)
     at, source = np.concatenate(places), np.array(sources)
-    n = len(at)
+    n, tint = len(at), DARK * np.array(pink, float)
     mix = sp.csr_matrix((np.ones(n), (np.arange(n), source)), (n, len(ground.at)))
     patch = Submesh(mix, at - ground.at[source], np.concatenate(triangles).astype(np.int32))
-    return Part("tears", patch, at, patch.triangles, np.tile(TINT, (n, 1)), np.ones(n), np.full(n, 0.85))
+    return Part("tears", patch, at, patch.triangles, np.tile(tint, (n, 1)), np.ones(n), np.full(n, 0.85))
