@@ -8,7 +8,6 @@ import numpy as np
 from realizer.core.array_types import Float32, Int16
 from realizer.face.model import Face
 
-CLOTH = "shirt"
 SHORT = 1e-3  # m; shorter sides of triangles count as that long in normals
 ROOM = 0.15  # m around the neutral mesh for all that the head's turns and the jaw may reach
 
@@ -62,7 +61,7 @@ def _corners(face: Face) -> tuple[Any, Any]:
     at = face.vertices[face.triangles]
     squares = np.maximum(((np.roll(at, -1, axis=1) - at) ** 2).sum(axis=2), SHORT**2)
     weights = 1 / (squares * np.roll(squares, 1, axis=1))
-    first, last = face.parts.get(CLOTH, (0, 0))
+    first, last = face.parts.get("shirt", (0, 0))
     weights[(face.triangles >= first).all(axis=1) & (face.triangles < last).all(axis=1)] = 1
     columns = np.repeat(np.arange(len(at), dtype=np.int32), 3)
     matrix = csr_matrix((weights.ravel(), (face.triangles.ravel(), columns)), (len(face.vertices), len(at)))

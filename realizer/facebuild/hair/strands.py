@@ -177,8 +177,7 @@ def _push(scalp: Scalp, style: Style, at: Float64, layer: Float64, rise: Float64
     push = np.maximum(height - lift, (height - lift) * (1 - hang)).clip(-STEP / 2, STEP / 2)
     skull = unit(at - scalp.middle) * np.maximum(style.heavy * smooth(at[:, 1], -0.07, -0.03), ear)[:, None]
     # An ear's own normals would part the hair over it.
-    way = unit(ups * (1 - ear)[:, None] + 2 * skull)
-    return way * np.where(scalp.distance(at) < NEAR, push, 0)[:, None]
+    return unit(ups * (1 - ear)[:, None] + 2 * skull) * np.where(scalp.distance(at) < NEAR, push, 0)[:, None]
 
 
 def _is_wrong(scalp: Scalp, style: Style, places: Float64) -> Bool:

@@ -15,8 +15,6 @@ from realizer.tables import toml_table
 
 COLLAR = 0.486  # of the face's height, hairline to chin: how far below the chin the collar is in front
 TILT = 0.42  # of the plane of the collar, which rises backwards
-
-
 POINT = 0.045  # m from the middle that a pointed collar reaches its full height
 
 
@@ -93,17 +91,15 @@ def glasses_of(table: Mapping[str, Any]) -> dict[str, Any] | None:
     styles = toml_table("glasses.toml")
     if (style := table.get("style")) not in styles:
         raise FaceError(f"glasses: style: wanted one of {', '.join(styles)}, got {style!r}")
-    plain = styles[style]
-    for key, value in table.items():
-        if key == "style":
-            continue
+    plain, own = styles[style], {key: value for key, value in table.items() if key != "style"}
+    for key, value in own.items():
         if key not in plain:
             hint = did_you_mean(similar(key, plain, 1))
             raise FaceError(f"glasses: wanted one of style, {', '.join(plain)}, got {key!r}{hint}")
         kind = list if key == "colour" else (int, float)
         if not isinstance(value, kind) or isinstance(value, bool):
             raise FaceError(f"glasses: {key}: wanted {plain[key]!r} or the like, got {value!r}")
-    return {**plain, **{key: value for key, value in table.items() if key != "style"}}
+    return {**plain, **own}
 
 
 def glasses(
@@ -121,8 +117,7 @@ def glasses(
     bent = 2 / figures["power"]
     x = figures["width"] * np.sign(np.cos(turn)) * np.abs(np.cos(turn)) ** bent
     y = figures["height"] * np.sign(np.sin(turn)) * np.abs(np.sin(turn)) ** bent
-    tubes = []
-    inner, outer = [], []
+    tubes, inner, outer = [], [], []
     for (centre, _), ear in zip(eyes, ears, strict=True):
         side = np.sign(centre[0])
         # Lenses wrap around the face a little, and stand low on the eyes.

@@ -179,11 +179,7 @@ def _scalp(skin: Skin, out: Float32) -> None:
     points = {name: ground.point(name) for name in ground.points}
     scalp = Scalp(patch.positions(ground.at), patch.triangles, points, style.line, style.rise)
     ragged = 0.004 * skin.noise(0.005, 45)
-
-    def under(at: Any) -> Any:
-        return shadow(scalp, style, at)
-
-    where = np.clip(skin.texels.broad(under) * (1 + 40 * ragged), 0, 1)
+    where = np.clip(skin.texels.broad(partial(shadow, scalp, style)) * (1 + 40 * ragged), 0, 1)
     hair = Skin.float(colour_of(style, skin.recipe.colours["hair"]))
     out += (0.45 * where)[:, None] * (hair - out)
     _dots(skin, out, "roots", where, hair)

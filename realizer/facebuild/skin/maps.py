@@ -93,7 +93,7 @@ def bake(
     surface = surface_of(skin, relief)
     # Slopes are drawn as if all texels were of one width.
     step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)
-    whole = _opaque(texels.picture(to_bytes(albedo), 255))
+    whole = np.dstack([texels.picture(to_bytes(albedo), 255), np.full((size, size), 255, np.uint8)])
     strands = atlas.HAIR.texels(size)
     whole[strands] = hair_texture(strands[0].stop - strands[0].start)
     pictures = {
@@ -107,7 +107,3 @@ def bake(
     pictures["albedo"][(*eye, slice(3))], pictures["surface"][eye] = looks
     ups = vertex_normals(part.vertices, part.triangles)
     return SkinMaps(pictures, corners, regions(lines), weights(skin, lines, ups))
-
-
-def _opaque(colours: UInt8) -> UInt8:
-    return np.dstack([colours, np.full(colours.shape[:2], 255, np.uint8)])

@@ -140,8 +140,8 @@ def _roughness(skin: Skin) -> Float32:
     out = row["cheek"] + (row["oily"] - row["cheek"]) * skin.oily()
     out = out + (row["lids"] - out) * np.clip(lids, 0, 1) * 0.6
     # On dark skin the same highlight would look wet.
-    dark = max(0.0, EVEN - float(np.mean(skin.recipe.colours["skin"])) / 255)
-    out = out + 0.06 * skin.look.age + MATT * dark
+    dark = EVEN - float(np.mean(skin.recipe.colours["skin"])) / 255
+    out = out + 0.06 * skin.look.age + MATT * max(0.0, dark)
     out = out + row["fine"] * (skin.noise(0.0012, 80) + 0.5 * skin.noise(0.005, 81))
     out = out + (row["lips"] + 0.03 * skin.noise(0.0010, 82, skin.red) - out) * skin.red
     wet = smooth(skin.ring, 2.0, 1.0)

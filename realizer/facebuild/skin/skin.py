@@ -1,6 +1,7 @@
 """The skin of a person at the texels of its maps: places, regions and figures that all maps are made of."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -98,10 +99,7 @@ class Skin:
             length: metres between independent values; number: what the noise is for.
             mask: (k,) where it is wanted, if not everywhere; it is 0 elsewhere.
         """
-
-        def field(at: Float32) -> Float32:
-            return noise(at, length, self.seed + number)
-
+        field = partial(noise, length=length, seed=self.seed + number)
         return self.texels.broad(field) if length > FINE else self.within(mask, field)
 
     def within(self, mask: Any, field: Callable[[Float32], Any], at: Any = None) -> Float32:
