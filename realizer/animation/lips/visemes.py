@@ -1,7 +1,6 @@
 """Conversion of IPA phonemes to mixtures of MPEG-4 visemes, and of mouth shapes to FAPs."""
 
 import math
-import unicodedata
 from dataclasses import dataclass, fields
 from functools import cache, lru_cache, partial
 from itertools import chain
@@ -11,7 +10,7 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Float64
-from realizer.tables.phonemes import PhonemeFeatures, phoneme_features
+from realizer.tables.phonemes import PhonemeFeatures, phoneme_features, symbols
 
 VISEME_COUNT = 15  # 0 none, 1..14: ISO/IEC 14496-2
 ROUNDED = 14  # the viseme of a rounded mouth
@@ -104,7 +103,7 @@ def sounds(ipa: str) -> tuple[Articulation, ...]:
     ignored; unknown letters are replaced by their base letter or ignored.
     """
     found: list[tuple[Mix, Mix, bool]] = []
-    for symbol, labialised in _symbols(ipa):
+    for symbol, labialised in symbols(ipa):
         row = phoneme_features()[symbol]
         viseme = _viseme_of(row.place, row.manner)
         mix: Mix = _vowel_mix(row) if row.kind == "vowel" else ((viseme, 1.0),) if viseme else ()
@@ -124,25 +123,6 @@ def sounds(ipa: str) -> tuple[Articulation, ...]:
         Articulation(mix, vowel, t / whole, shape)
         for (mix, shape, vowel), t in zip(found, lengths, strict=True)
     )
-
-
-def _symbols(ipa: str) -> list[tuple[str, bool]]:
-    """Return (symbol of the table, whether it is labialised) in order."""
-    known = phoneme_features()
-    symbols: list[tuple[str, bool]] = []
-    # The composed form first: ç is a letter of its own, while õ is o with a diacritic.
-    for letter in unicodedata.normalize("NFC", ipa):
-        if letter == "ʷ" and symbols:
-            symbols[-1] = (symbols[-1][0], True)
-            continue
-        plain = letter if letter in known else unicodedata.normalize("NFD", letter.lower())[0]
-        if plain in known:
-            pair = symbols[-1][0] + plain if symbols else ""
-            if pair in known:  # an affricate: two letters, one sound
-                symbols[-1] = (pair, symbols[-1][1])
-            else:
-                symbols.append((plain, False))
-    return symbols
 
 
 def _vowel_mix(row: PhonemeFeatures) -> Mix:

@@ -155,7 +155,7 @@ class AudioClips:
         if not count:
             return []
         part = f"{id}/{arriving.count}"
-        pcm, words, phonemes = arriving.take(count)
+        pcm, words, phonemes = arriving.take(count, ends=is_last and clip.sound is not None)
         self._clips[part] = Clip(rate=clip.rate, sound=(clip.rate, pcm), words=words, phonemes=phonemes)
         self._changed.add(part)
         self._publish(part, self._clips[part])
@@ -260,6 +260,6 @@ def _spans(timed: Sequence[TimedText], duration: float) -> list[tuple[float, flo
     following = [*(item.start for item in timed[1:]), duration]
     spans = []
     for item, next_start in zip(timed, following, strict=False):  # `following` is never empty
-        end = next_start if item.end is None else item.end
-        spans.append((item.start, max(item.start, end), item.text))
+        end = max(item.start, next_start) if item.end is None else item.end
+        spans.append((item.start, end, item.text))
     return spans

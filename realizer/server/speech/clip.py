@@ -103,15 +103,20 @@ class ArrivingClip:
         count = there if is_free else max((end for end in ends if end <= there), default=0)
         return count if count >= FIRST * self.rate else 0
 
-    def take(self, count: int) -> tuple[Int16, list[TimedText], list[TimedText]]:
-        """Return so many samples as the next part, the words that begin in it, and its phonemes."""
+    def take(self, count: int, *, ends: bool = False) -> tuple[Int16, list[TimedText], list[TimedText]]:
+        """Return so many samples as the next part, the words that begin in it, and its phonemes.
+
+        If the sound `ends` here, those that begin later are added, so that they are warned about.
+        """
         begin, start, end = self.taken, self.taken / self.rate, (self.taken + count) / self.rate
-        words = [w for w in self.words if 0 <= self._at(w.start) < count]
+        words = [w for w in self.words if self._at(w.start) >= 0 and (ends or self._at(w.start) < count)]
         following = [*(p.start for p in self.phonemes[1:]), math.inf]
         spans = [
             (p, later if p.end is None else p.end) for p, later in zip(self.phonemes, following, strict=False)
         ]
+        phonemes: list[tuple[TimedText, float | None]]
         phonemes = [(p, min(until, end)) for p, until in spans if p.start < end and until > start]
+        phonemes += [(p, p.end) for p in self.phonemes if ends and p.start >= end]
         pcm = samples_of(bytes(self.sound[: 2 * count]))
         del self.sound[: 2 * count]
         self.taken, self.count = begin + count, self.count + 1
@@ -127,7 +132,7 @@ class ArrivingClip:
 
 
 def _moved(item: TimedText, end: float | None, start: float) -> TimedText:
-    moved = {"start": max(0.0, item.start - start), "end": None if end is None else end - start}
+    moved = {"start": max(0.0, item.start - start), "end": None if end is None else max(0.0, end - start)}
     return item.model_copy(update=moved)
 
 

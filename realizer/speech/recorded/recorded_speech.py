@@ -13,12 +13,16 @@ from realizer.core.array_types import Bool, Float64, Int16
 from realizer.speech.sound_visemes.mel_stream import viseme_facts
 from realizer.speech.sound_visemes.recogniser import recognised
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word, tile
+from realizer.tables.phonemes import symbols
 
 # Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
 # time this much before the start of the next one.
 EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
-SLACK = 0.1  # s by which times of words may be wrong without a warning, as those of many voices are
+# s by which times may be wrong without a warning, as those of many voices are
+SLACK = 0.1
+OVERLAP = {"words": 0.1, "phonemes": 0.03}
+MILLISECONDS = 10  # lengths of the sound after which a time is probably in another unit
 STEP = 0.02  # s between the instants at which sounds are compared
 CACHED = 8  # recordings; a document is planned more than once before it plays
 
@@ -29,12 +33,19 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     """Return a recording as an utterance, by its times if known, else by alignment, else by its sound.
 
     Known phonemes are used unchanged; if only words are known, each has the phonemes of the reference voice.
+    Words, or phonemes, most of which are outside the sound or name no sound are not used, with a warning.
     Marks are placed before their words. Without times the text is aligned with the sound; without a text
     mouth shapes are recognised in the sound, or if it is no speech, the mouth opens with the loudness.
 
     Raises:
         VoiceError: if the text is too long, or the reference voice died.
     """
+    usable, warnings = _checked(recording)
+    found = _placed(request, usable)
+    return replace(found, warnings=(*warnings, *found.warnings)) if warnings else found
+
+
+def _placed(request: SpeechRequest, recording: Recording) -> Utterance:
     # Imported here, because loading the aligners takes longer than most texts to speak.
     from realizer.speech.align.aligner import align_recording
     from realizer.speech.registry import reference_voice
@@ -83,27 +94,57 @@ def _utterance(
         tiled.append(Phoneme(now, duration, ""))
     kept = tuple(replace(w, start=min(w.start, duration), end=min(w.end, duration)) for w in words)
     inside = {name: min(max(time, 0.0), duration) for name, time in marks.items()}
-    rate, faults = recording.rate, _time_faults(words, duration)
-    return Utterance(duration, kept, tuple(tiled), inside, rate, recording.pcm, warnings=faults)
+    return Utterance(duration, kept, tuple(tiled), inside, recording.rate, recording.pcm)
 
 
-def _time_faults(words: Sequence[Word], duration: float) -> tuple[str, ...]:
-    """Return what is wrong with the times of words, a sentence for each kind of fault."""
-    late = [word for word in words if word.start > duration + SLACK]
-    torn = [(one, two) for one, two in pairwise(words) if one.end > two.start + SLACK]
-    faults = []
+@lru_cache(CACHED)
+def _checked(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """Return a recording with the words and phonemes that can be used, and what is wrong with the others."""
+    duration = len(recording.pcm) / recording.rate
+    words, wrong = _usable("words", recording.words, duration)
+    phonemes, more = _usable("phonemes", recording.phonemes, duration)
+    if (words, phonemes) != (recording.words, recording.phonemes):
+        recording = replace(recording, words=words, phonemes=phonemes)
+    return recording, (*wrong, *more)
+
+
+def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple[Timed, ...], list[str]]:
+    """Return items, none if most cannot be used, and a sentence for each kind of fault."""
+    spoken = [(item, text) for item in given if (text := _text_of(item).strip())]
+    late = [(item, text) for item, text in spoken if item.start > duration + SLACK]
+    turned = [(item, text) for item, text in spoken if item.end < item.start]
+    mute = [text for item, text in spoken if isinstance(item, Phoneme) and not symbols(text)]
+    torn = [(a, b) for a, b in pairwise(given) if a.end > b.start + OVERLAP[kind]]
+    faults: list[str] = []
     if late:
+        item, text = late[0]
+        unit = ": milliseconds?" if item.start > MILLISECONDS * duration else ""
         faults.append(
-            f"wanted words that begin within the {duration:.2f} s of the sound, got {late[0].text!r} at "
-            f"{late[0].start:.2f} s{_more(late)}"
+            f"wanted {kind} that begin within the {duration:.2f} s of the sound, got {text!r} at "
+            f"{item.start:.2f} s{_more(late)}{unit}"
+        )
+    if turned:
+        item, text = turned[0]
+        faults.append(
+            f"wanted {kind} that begin before they end, got {text!r} from {item.start:.2f} s "
+            f"to {item.end:.2f} s{_more(turned)}"
         )
     if torn:
         one, two = torn[0]
         faults.append(
-            f"wanted words that follow each other, got {one.text!r} up to {one.end:.2f} s and {two.text!r} "
-            f"from {two.start:.2f} s on{_more(torn)}"
+            f"wanted {kind} that follow each other, got {_text_of(one)!r} up to {one.end:.2f} s and "
+            f"{_text_of(two)!r} from {two.start:.2f} s on{_more(torn)}"
         )
-    return tuple(faults)
+    if mute:
+        faults.append(f'wanted {kind} in IPA, or "" for a pause, got {mute[0]!r}{_more(mute)}')
+    good = sum(item.start < min(item.end, duration) for item, _ in spoken) - len(mute)
+    if spoken and (good <= 0 or 2 * good < len(spoken)):
+        return (), [*faults, f"these {kind} are not used"]
+    return tuple(replace(item, end=max(item.start, item.end)) for item in given), faults
+
+
+def _text_of(item: Word | Phoneme) -> str:
+    return item.text if isinstance(item, Word) else item.ipa
 
 
 def _more(found: Sequence[object]) -> str:

@@ -1,6 +1,6 @@
 """Tests of `realizer.tables.phonemes`."""
 
-from realizer.tables.phonemes import phoneme_features, vowels
+from realizer.tables.phonemes import phoneme_features, symbols, vowels
 
 
 def test_phonemes_vowels_alone_have_a_height() -> None:
@@ -12,3 +12,8 @@ def test_phonemes_vowels_are_one_letter_each() -> None:
     assert all(len(ipa) == 1 for ipa in vowels())
     assert set("aeiouəɪʊɑɔ") < vowels()
     assert not set("pbtdkgszʃʒlɹmnŋ") & vowels()
+
+
+def test_symbols_of_a_string_are_its_sounds() -> None:
+    assert symbols("tʃʷãː") == [("tʃ", True), ("a", False)]
+    assert symbols("?!") == symbols("7") == symbols("ˈ") == []

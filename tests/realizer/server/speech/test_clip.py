@@ -58,3 +58,11 @@ def test_arriving_clip_divides_phonemes_between_parts() -> None:
     parts = [clip.take(300)[2], clip.take(400)[2]]
     spans = [[(round(p.start, 3), round(p.end, 3), p.text) for p in part] for part in parts]
     assert spans == [[(0, 0.25, "a"), (0.25, 0.3, "b")], [(0, 0.2, "b"), (0.3, 0.4, "c")]]
+
+
+def test_arriving_clip_adds_what_begins_after_the_sound_to_its_last_part() -> None:
+    clip = arriving([(0.1, None, "one"), (100, 200, "two")], [(0.1, 0.2, "w"), (100, None, "t")])
+    add(clip, 0.5)
+    _, words, phonemes = clip.take(500, ends=True)
+    assert [(w.start, w.end, w.text) for w in words] == [(0.1, None, "one"), (100, 200, "two")]
+    assert [(p.start, p.end, p.text) for p in phonemes] == [(0.1, 0.2, "w"), (100, None, "t")]

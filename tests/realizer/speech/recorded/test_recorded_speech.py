@@ -134,6 +134,10 @@ def test_by_loudness_opens_the_jaw() -> None:
             ("wanted words that begin within the 2.00 s of the sound, got 'so' at 7.00 s, and 1 more",),
         ),
         (
+            (Word(0.2, 0.5, "One"), Word(1.0, 0.6, "two"), Word(1.3, 1.8, "three")),
+            ("wanted words that begin before they end, got 'two' from 1.00 s to 0.60 s",),
+        ),
+        (
             (Word(0.2, 0.9, "One"), Word(0.5, 1.0, "two")),
             ("wanted words that follow each other, got 'One' up to 0.90 s and 'two' from 0.50 s on",),
         ),
@@ -141,6 +145,70 @@ def test_by_loudness_opens_the_jaw() -> None:
 )
 def test_utterance_of_warns_of_words_in_wrong_places(words, faults) -> None:
     assert said(words=words).warnings == faults
+
+
+PHONEMES = (Phoneme(0.2, 0.5, "m"), Phoneme(0.5, 0.8, "a"), Phoneme(0.8, 1.0, ""))
+LATE = "wanted phonemes that begin within the 2.00 s of the sound, got "
+
+
+@pytest.mark.parametrize(
+    ("phonemes", "fault"),
+    [
+        ((*PHONEMES, Phoneme(1.0, 1.2, "m"), Phoneme(7, 8, "a")), LATE + "'a' at 7.00 s"),
+        (
+            (*PHONEMES, Phoneme(1.0, 1.2, "m"), Phoneme(1.1, 1.2, "a")),
+            "wanted phonemes that follow each other, got 'm' up to 1.20 s and 'a' from 1.10 s on",
+        ),
+        (
+            (*PHONEMES, Phoneme(1.2, 1.0, "m")),
+            "wanted phonemes that begin before they end, got 'm' from 1.20 s to 1.00 s",
+        ),
+        ((*PHONEMES, Phoneme(1, 1.2, "?!")), "wanted phonemes in IPA, or \"\" for a pause, got '?!'"),
+    ],
+)
+def test_utterance_of_warns_of_a_wrong_phoneme_and_uses_the_others(phonemes, fault) -> None:
+    utterance = said(phonemes=phonemes)
+    assert utterance.warnings == (fault,)
+    assert [p for p in utterance.phonemes if p.ipa][:2] == list(PHONEMES[:2])
+
+
+@pytest.mark.parametrize(
+    ("phonemes", "fault"),
+    [
+        (
+            (Phoneme(0, 100, "m"), Phoneme(100, 200, "a"), Phoneme(200, 250, "m")),
+            LATE + "'a' at 100.00 s, and 1 more: milliseconds?",
+        ),
+        ((Phoneme(0.5, 1, "7"),), "wanted phonemes in IPA, or \"\" for a pause, got '7'"),
+        (
+            (Phoneme(0.9, 0.4, "m"),),
+            "wanted phonemes that begin before they end, got 'm' from 0.90 s to 0.40 s",
+        ),
+    ],
+)
+def test_utterance_of_wrong_phonemes_uses_words_text_or_sound(phonemes, fault) -> None:
+    unused = "these phonemes are not used"
+    with_words = said(words=WORDS, phonemes=phonemes)
+    assert with_words.warnings == (fault, unused)
+    assert with_words.phonemes == said(words=WORDS).phonemes
+    with_text = said(phonemes=phonemes)
+    assert with_text.warnings[:2] == (fault, unused)
+    assert with_text.phonemes == said().phonemes
+    by_sound = said(SpeechRequest(""), phonemes=phonemes)
+    assert by_sound.warnings == (fault, unused)
+    assert by_sound.phonemes == by_loudness(SOUND, RATE)
+
+
+def test_utterance_of_wrong_words_aligns_the_text() -> None:
+    utterance = said(words=(Word(100, 500, "One"), Word(500, 900, "two")))
+    late = "wanted words that begin within the 2.00 s of the sound, got 'One' at 100.00 s, and 1 more"
+    assert utterance.warnings[:2] == (f"{late}: milliseconds?", "these words are not used")
+    assert utterance.phonemes == said().phonemes
+
+
+def test_utterance_of_pauses_alone_stays_silent() -> None:
+    utterance = said(phonemes=(Phoneme(0, 1, ""), Phoneme(1, 900, " ")))
+    assert utterance.warnings == ()
 
 
 def test_viseme_sets_have_silence_and_closed_lips() -> None:
