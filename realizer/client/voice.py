@@ -1,5 +1,6 @@
 """Speech of any other voice: sound that is sent in clips, with or without the times of its words."""
 
+import math
 import secrets
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
@@ -17,6 +18,7 @@ PIECE, LONGEST_PIECE = 0.2, 2.0  # s
 LONGEST = 1 << 20  # bytes of one message
 # The sound of a last word, whose end is not known, waits at most so long for the next word.
 HOLD = 1.0  # s
+LOUDEST = 4.0  # floats beyond it are not within -1 to 1 and a little too loud, but int16 samples
 DESCRIBING = ("text", "words", "phonemes", "visemes")  # fields of `speech`
 
 Send = Callable[[bytes], Awaitable[None]]
@@ -142,13 +144,15 @@ def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:
     """Return words, phonemes or visemes as fields of the message `speech`.
 
     Raises:
-        TypeError: an item has another form.
+        TypeError: an item has another form; ValueError: a time is negative or not finite.
     """
     found = []
     for item in items:
         numbers, text = (item[:-1], item[-1]) if isinstance(item, Sequence) and item else ((), None)
-        if not (isinstance(text, str) and 1 <= len(numbers) <= 2 and all(map(_is_time, numbers))):
+        if not (isinstance(text, str) and 1 <= len(numbers) <= 2 and all(map(_is_number, numbers))):
             raise TypeError(f"{name}: wanted (seconds, text) or (start, end, text), got {item!r}")
+        if not all(0 <= number < math.inf for number in numbers):
+            raise ValueError(f"{name}: wanted seconds from 0 on, got {item!r}")
         found.append(dict(zip(("start", "end"), map(float, numbers), strict=False)) | {"text": text})
     return found
 
@@ -157,7 +161,8 @@ def samples_of(pcm: Pcm) -> Int16:
     """Return mono sound as int16 samples.
 
     Raises:
-        TypeError: it is of another type; ValueError: it is not mono, or has half a sample.
+        TypeError: it is of another type.
+        ValueError: it is not mono, has half a sample, or floats that are no numbers or far beyond -1 to 1.
     """
     if isinstance(pcm, bytes | bytearray | memoryview):
         if len(bytes(pcm)) % 2:
@@ -169,7 +174,11 @@ def samples_of(pcm: Pcm) -> Int16:
     if samples.ndim != 1:
         raise ValueError(f"sound: wanted mono sound, (n,), got {samples.shape}")
     if samples.dtype.kind == "f":
-        samples = np.rint(np.nan_to_num(samples).clip(-1, 1) * 32767)
+        loudest = float(np.abs(samples).max(initial=0.0))
+        if not loudest <= LOUDEST:
+            unit = ": int16?" if LOUDEST < loudest < math.inf else ""
+            raise ValueError(f"sound: wanted floats from -1 to 1, got up to {loudest:g}{unit}")
+        samples = np.rint(samples.clip(-1, 1) * 32767)
     return samples.astype(np.int16)
 
 
@@ -182,5 +191,5 @@ def checked_rate(rate: int) -> int:
     return rate
 
 
-def _is_time(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and value >= 0
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -3,6 +3,7 @@ import { RealizerError, packClip } from "./frames.js";
 
 const PIECE = 0.2; // s; a clip without words is sent in pieces of this length, the first of which starts the speech
 const LONGEST = 1 << 20; // bytes of a message
+const LOUDEST = 4; // floats beyond it are not within -1 to 1 and a little too loud, but int16 samples
 const nothing = () => {};
 
 /** A speech that is sent as sound comes; `Realizer.voice` opens one. */
@@ -132,7 +133,11 @@ export function timed(name, items) {
 /** Return mono samples as Int16Array. */
 export function samplesOf(pcm) {
   if (pcm instanceof Int16Array) return pcm;
-  if (pcm instanceof Float32Array) return Int16Array.from(pcm, (x) => Math.round(Math.max(-1, Math.min(1, x)) * 32767));
+  if (pcm instanceof Float32Array) {
+    const wrong = pcm.find((x) => !(Math.abs(x) <= LOUDEST));
+    if (wrong !== undefined) throw new RangeError(`sound: wanted floats from -1 to 1, got ${wrong}`);
+    return Int16Array.from(pcm, (x) => Math.round(Math.max(-1, Math.min(1, x)) * 32767));
+  }
   const bytes = pcm instanceof ArrayBuffer ? new Uint8Array(pcm) : pcm;
   if (!(bytes instanceof Uint8Array)) throw new TypeError("sound: wanted Int16Array, Float32Array, or bytes of int16 samples");
   if (bytes.length % 2) throw new TypeError(`sound: wanted samples of two bytes, got ${bytes.length} bytes`);

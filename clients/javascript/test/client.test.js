@@ -75,6 +75,8 @@ test("say rejects words whose times go back", async () => {
 
 test("say rejects what is no sound and no word", async () => {
   await assert.rejects(realizer.say("hello"), TypeError);
+  await assert.rejects(realizer.say(Float32Array.from(tone(0.1)), { rate: RATE }), /from -1 to 1, got/);
+  await assert.rejects(realizer.say(new Float32Array([0, NaN]), { rate: RATE }), /from -1 to 1, got NaN/);
   await assert.rejects(realizer.say(tone(0.1), { rate: 0.5 }), /rate: wanted samples a second/);
   await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: ["Hello"] }), /words\[0\]: wanted/);
 });

@@ -117,7 +117,8 @@ def _explain(errors: list[ErrorDetails]) -> str:
     first = errors[0]
     got = "nothing" if first["type"] == "missing" else _short(first["input"])
     if first["type"] not in _WANTED:
-        return f"{first['msg'].removeprefix('Value error, ')}; got {got}"
+        said = first["msg"].removeprefix("Value error, ")
+        return said if ", got " in said else f"{said}; got {got}"
     wanted = [_WANTED[e["type"]].format(**e.get("ctx", {})) for e in errors if e["type"] in _WANTED]
     return f"wanted {' or '.join(dict.fromkeys(wanted))}; got {got}"
 

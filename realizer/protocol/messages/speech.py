@@ -9,7 +9,8 @@ from realizer.protocol.messages.common import Message, examples
 
 # Longest text of one `speech` message; a speech may have any number of them.
 MAX_APPEND = 20_000  # characters
-_CAPITAL = re.compile("[A-Z]")  # of other alphabets, such as ARPABET and SAMPA
+# Of other alphabets: capitals, as of SAMPA, and the vowels of ARPABET with their stress in any case.
+_NOT_IPA = re.compile("[A-Z]|^(a[aehowxy]|e[hry]|i[hy]|o[wy]|u[hw])[0-2]$")
 
 
 class TimedText(Message):
@@ -84,6 +85,6 @@ class SpeechMessage(Message):
         if self.phonemes and self.visemes:
             raise ValueError("wanted phonemes or visemes, got both")
         for phoneme in self.phonemes:
-            if _CAPITAL.search(phoneme.text):
-                raise ValueError(f"phonemes: wanted IPA, which has no capitals, got {phoneme.text!r}")
+            if _NOT_IPA.search(phoneme.text):
+                raise ValueError(f"phonemes: wanted IPA, got {phoneme.text!r}: ARPABET or SAMPA?")
         return self

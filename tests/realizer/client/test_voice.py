@@ -210,14 +210,25 @@ def test_samples_of_floats_are_scaled_and_clipped() -> None:
     assert samples_of(b"\x01\x00\xff\xff").tolist() == [1, -1]
 
 
+@pytest.mark.parametrize(
+    ("loudest", "got"), [(12000.0, r"up to 12000: int16\?"), (np.nan, "up to nan$"), (-np.inf, "up to inf$")]
+)
+def test_samples_of_refuses_floats_far_beyond_one(loudest: float, got: str) -> None:
+    with pytest.raises(ValueError, match=f"sound: wanted floats from -1 to 1, got {got}"):
+        samples_of(np.array([0.0, loudest]))
+
+
 def test_timed_takes_starts_with_or_without_ends() -> None:
     assert timed("words", [(0, "a"), (0.5, 1, "b")]) == [
         {"start": 0.0, "text": "a"},
         {"start": 0.5, "end": 1.0, "text": "b"},
     ]
-    for wrong in (["hello", 0.0, 1.0], "ab", (-1, "a"), (True, "a"), 3, ()):
+    for wrong in (["hello", 0.0, 1.0], "ab", (True, "a"), 3, ()):
         with pytest.raises(TypeError, match="words: wanted"):
             timed("words", [wrong])  # type: ignore[list-item]
+    for start in (-0.1, np.inf, np.nan):
+        with pytest.raises(ValueError, match="words: wanted seconds from 0 on, got"):
+            timed("words", [(start, "h")])
 
 
 class Sent:
