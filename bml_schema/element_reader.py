@@ -3,7 +3,7 @@
 It raises the first fault as a Fault; the caller decides what is dropped.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any, cast
 
@@ -85,6 +85,11 @@ class ElementReader:
         if elsewhere not in self.vocabulary or known in self.vocabulary:
             return known
         return elsewhere if self.lenient or not elsewhere.startswith(_IN_BMLA) else known
+
+    @property
+    def suggest(self) -> Callable[[str, Iterable[str]], str]:
+        """The function that returns `, did you mean ...?` for a word and what is known, or ""."""
+        return did_you_mean if self.names is None else self.names.suggest
 
     # element := attributes children
 
@@ -168,7 +173,6 @@ class ElementReader:
         wrong = [name for name in names if name[0] != "{" or name.startswith(_OWN)]
         if not wrong:
             return ""
-        suggest = did_you_mean if self.names is None else self.names.suggest
         known = [name for name in schema.attributes if name[0] != "{"]
         if timed:
             known += schema.sync_points
@@ -179,7 +183,8 @@ class ElementReader:
         texts[-1] += f"; known are {', '.join(known)}" if known else "; there are none"
         kinds = [_of_same_kind(schema, known, element.get(name, "")) for name in wrong]
         return "; ".join(
-            text + suggest(local(name), kind) for text, name, kind in zip(texts, wrong, kinds, strict=True)
+            text + self.suggest(local(name), kind)
+            for text, name, kind in zip(texts, wrong, kinds, strict=True)
         )
 
     def children(self, schema: NodeSchema, element: etree._Element, values: dict[str, Any]) -> None:
@@ -202,7 +207,8 @@ class ElementReader:
             if spec is not None:
                 nodes_by_field.setdefault(spec[0].field, []).append(self.node(spec[1], child))
             elif tag.startswith(_OURS):
-                raise Fault(f"wanted {schema.listed}, got <{local(tag)}>", child)
+                near = self.suggest(local(tag), map(local, schema.by_tag))
+                raise Fault(f"wanted {schema.listed}, got <{local(tag)}>{near}", child)
             elif schema.timed:
                 others.append(canonical(child))
         if text and not text.isspace():
@@ -235,7 +241,9 @@ class ElementReader:
         for child in element:
             spec = schema.by_tag.get(self.tag(child))
             if spec is None:
-                raise Fault(f"wanted text and {schema.listed}, got <{local(str(child.tag))}>", child)
+                name = local(str(child.tag))
+                near = self.suggest(name, map(local, schema.by_tag))
+                raise Fault(f"wanted text and {schema.listed}, got <{name}>{near}", child)
             if child.get("id", "").strip() == "bml":
                 message = 'id: "bml" means the block in references, so this <sync> does nothing'
                 self.remarks.append(Fault(message, child, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))

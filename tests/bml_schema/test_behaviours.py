@@ -180,6 +180,8 @@ def test_speech_text_keeps_its_language() -> None:
         ("<text><sync id='end'/></text>", 'sync: wanted an id of its own, got "end" again'),
         ("<text><sync/></text>", "id: wanted a name"),
         ("<text>a <b>c</b></text>", "wanted text and <sync>, got <b>"),
+        ("<text>a <synk id='m'/></text>", 'wanted text and <sync>, got <synk>, did you mean "sync"?'),
+        ("<texte>a</texte>", 'wanted <text>, got <texte>, did you mean "text"?'),
         ("Hello", 'wanted elements, got the text "Hello", put it into <text>'),
         ("<text/>Hello", 'wanted elements, got the text "Hello", put it into <text>'),
         ("<txt>Hello</txt>", "wanted <text>, got <txt>"),
