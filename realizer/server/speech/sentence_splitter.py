@@ -8,7 +8,11 @@ from realizer import tables
 
 # A tag; groups: "/" of an end tag, name, attributes, "/" of an empty element.
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
-BEGUN = re.compile(r"</?(?:[A-Za-z_][^<>]*)?$")  # an incomplete tag
+VALUE = r"(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>/]+)"
+BEGUN = re.compile(  # an incomplete tag
+    rf"</?(?:[A-Za-z_][\w.:-]*(?:\s+[\w.:-]+\s*=\s*{VALUE})*+"
+    r"\s*(?:/|[\w.:-]+\s*(?:=\s*(?:\"[^\"]*|'[^']*|[^\s\"'<>/]*))?)?)?$"
+)
 ENTITY = re.compile(r"&#?\w{1,10}$")  # an entity without its semicolon
 MAX_TAG = 2000  # characters; longer text after "<" is not a tag
 MAX_TEXT = 20_000  # characters; longer text does not wait for an end tag

@@ -7,19 +7,25 @@ from functools import cache
 from xml.sax.saxutils import escape, quoteattr, unescape
 
 from bml_schema import Block, read
+from bml_schema.errors import PARSING_FAILURE, Problem, did_you_mean, quoted
 from bml_schema.escape import sanitized
 from bml_schema.nodes import BMLA, BMLT, CORE, OWN, SSML
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import TAG
-from realizer.speech.ssml import EMPTY, SPOKEN
+from realizer.speech.ssml import EMPTY, PLAIN, SPOKEN
 
 ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
-# An incomplete tag at the end of the text.
-BROKEN = re.compile(r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)(?:\s[^<>]*)?$")
+# A tag without its ">", or with an open quote; groups: name, attributes.
+BROKEN = re.compile(
+    r"</?(?:[\w.-]+:)?([A-Za-z][\w.-]+)"
+    r"((?:\s+[\w:.-]+\s*=\s*(?:\"[^\"<>]*\"|'[^'<>]*'|[\"']?[^\s\"'<>/]*))*)\s*/?>?"
+)
+BEGUN_ATTRIBUTE = re.compile(r"\s*[\w:-]+\s*")
 PREFIXES = {"bmla": BMLA, "bmlt": BMLT, "realizer": OWN}
 # Elements that, like behaviours, belong in the block and not in its text.
 BESIDE = frozenset({"constraint", "required"})
 SYNCS = frozenset({"sync", "mark", "bookmark"})
+MOST = 10  # faults of the markup of one chunk that are named
 QUOTES = {"&quot;": '"', "&apos;": "'"}
 
 
@@ -50,24 +56,38 @@ def text_block(text: str, chunk: Chunk) -> Block:
 
     <sync id="m"/> is a sync point of the speech, other SSML goes to the voice. A behaviour needs no id;
     without a sync reference it starts at its place in the text. `ID:m` refers to a sync of the speech, also
-    in earlier chunks. Text that is no XML or has invalid syncs is spoken without its tags. An incomplete tag
-    at the end is removed.
+    in earlier chunks. Text that is no XML or has invalid syncs is spoken without its tags. Faults of the
+    markup are a problem of the block, and lose no words.
     """
     parser = _Text(chunk)
     parser.read(sanitized(text))
-    items = list(read(chunk.document(parser.content()), VOCABULARY))
-    block = items[0] if len(items) == 1 and isinstance(items[0], Block) else None
-    if block is not None and (not parser.spoken or any(node.id == chunk.speech for node in block.behaviours)):
+    (item, *others) = read(chunk.document(parser.content()), VOCABULARY)
+    block = item if isinstance(item, Block) and not others else None
+    if block is None or (parser.spoken and all(node.id != chunk.speech for node in block.behaviours)):
+        plain = _Text(chunk)
+        plain.say(TAG.sub(" ", sanitized(text)))
+        (spoken,) = read(chunk.document(plain.content()), VOCABULARY)
+        assert isinstance(spoken, Block)
+        if block is None:
+            parser.add_fault(
+                f"{getattr(item, 'text', 'the markup is no XML')}: the text is spoken without it"
+            )
+            block = spoken
+        else:
+            # Speak the words although their syncs are invalid; the block's own children keep the warnings.
+            children = (*spoken.children, *block.children)
+            block = replace(block, children=children, places={**block.places, **spoken.places})
+    if not parser.faults:
         return block
-    plain = _Text(chunk)
-    plain.say(TAG.sub(" ", sanitized(text)))
-    (spoken,) = read(chunk.document(plain.content()), VOCABULARY)
-    assert isinstance(spoken, Block)
-    if block is None:
-        return spoken
-    # Speak the words although their syncs are invalid; the block's own children keep the warnings about them.
-    children = (*spoken.children, *block.children)
-    return replace(block, children=children, places={**block.places, **spoken.places})
+    problem = Problem(
+        id=f"{block.id}:{chunk.speech}",
+        type=PARSING_FAILURE,
+        text="; ".join(parser.faults),
+        line=0,
+        path="",
+        dropped=False,
+    )
+    return replace(block, problems=(*block.problems, problem))
 
 
 def clip_block(clip: str, chunk: Chunk) -> Block:
@@ -88,31 +108,44 @@ class _Text:
         self.ssml: list[str] = []  # <speak>
         self.behaviours: list[str] = []
         self.spoken = False  # whether there are words
-        self.marked = False
+        self.marks: set[str] = set()
+        self.faults: dict[str, None] = {}  # of the markup, in order
 
     def read(self, text: str) -> None:
-        at = 0
+        at = opened = 0  # the end of the last start tag of a sync
         while (tag := TAG.search(text, at)) is not None:
-            self.say(text[at : tag.start()])
+            self._words(text[at : tag.start()])
             at = tag.end()
             name = tag[2].rpartition(":")[2]
             if tag[1]:
+                if name in SYNCS and (inside := text[opened : tag.start()].strip()):
+                    self.add_fault(f"wanted an empty <{name}/>, got the text {quoted(inside)} in it")
                 self._markup(tag, name)
             elif name in _behaviours() or name in BESIDE:
                 at = tag.end() if tag[4] else _element_end(text, tag)
                 self._behave(tag, text[tag.end() : at], name)
             elif name in SYNCS:
-                values = dict(ATTRIBUTE.findall(tag[3]))
-                name = next((values[key] for key in ("id", "name", "mark") if key in values), "")
-                if name:
-                    ref = f" ref={values['ref']}" if "ref" in values else ""
-                    self._mark(unescape(name[1:-1], QUOTES), ref)
+                opened = at
+                self._sync(tag[0], tag[3])
             else:
                 self._markup(tag, name)
-        rest = text[at:]
-        if (broken := BROKEN.search(rest)) and broken[1] in {*SPOKEN, *EMPTY, *BESIDE, *_behaviours()}:
-            rest = rest[: broken.start()]
-        self.say(rest)
+        self._words(text[at:], is_last=True)
+
+    def add_fault(self, text: str) -> None:
+        if len(self.faults) < MOST:
+            self.faults[text] = None
+
+    def _words(self, text: str, *, is_last: bool = False) -> None:
+        """Add text between tags. Of a tag without its end, only the sync counts."""
+        at = 0
+        for tag in BROKEN.finditer(text):
+            if tag[1] in _known():
+                self.say(text[at : tag.start()])
+                at = len(text) if is_last and BEGUN_ATTRIBUTE.fullmatch(text, tag.end()) else tag.end()
+                self.add_fault(f'wanted ">" at the end of a tag, got {quoted(text[tag.start() :])}')
+                if tag[1] in SYNCS and ATTRIBUTE.search(tag[2]):
+                    self._sync(tag[0], tag[2])
+        self.say(text[at:])
 
     def say(self, text: str) -> None:
         """Add plain text, in which & and < need not be escaped."""
@@ -122,7 +155,7 @@ class _Text:
         self.ssml.append(escaped)
 
     def content(self) -> str:
-        if not self.spoken and not self.marked:
+        if not self.spoken and not self.marks:
             return "".join(self.behaviours)
         language = self.chunk.language
         lang = "" if language is None else f" xml:lang={quoteattr(language)}"
@@ -133,15 +166,32 @@ class _Text:
             speech += f'<description priority="1" type="{SSML}">{speak}</description>'
         return f'<speech id="{self.chunk.speech}">{speech}</speech>' + "".join(self.behaviours)
 
+    def _sync(self, tag: str, attributes: str) -> None:
+        values = dict(ATTRIBUTE.findall(attributes))
+        name = next((values[key] for key in ("id", "name", "mark") if key in values), "")
+        if name:
+            ref = f" ref={values['ref']}" if "ref" in values else ""
+            self._mark(unescape(name[1:-1], QUOTES), ref)
+        else:
+            self.add_fault(f'wanted <sync id="..."/>, got {quoted(tag)}')
+
     def _mark(self, name: str, attributes: str = "") -> None:
-        self.marked = True
+        if name in self.marks:
+            self.add_fault(f"sync: wanted an id of its own, got {quoted(name)} again")
+            return
+        self.marks.add(name)
         self.core.append(f"<sync id={quoteattr(name)}{attributes}/>")
         self.ssml.append(f"<mark name={quoteattr(name)}/>")
 
     def _markup(self, tag: re.Match[str], name: str) -> None:
         """Add an SSML tag without its prefix; unknown tags are left out."""
-        if name in {*SPOKEN, *EMPTY}:
+        if name in SPOKEN:
             self.ssml.append(f"<{tag[1]}{name}{tag[3]}{tag[4]}>")
+        elif name in EMPTY:
+            self.ssml.append("" if tag[1] else f"<{name}{tag[3]}/>")
+        elif name not in PLAIN and not tag[1] and len(self.faults) < MOST:
+            near = did_you_mean(name, sorted(_known()))
+            self.add_fault(f"wanted <sync>, SSML or a behaviour, got <{name[:40]}>{near}")
 
     def _behave(self, tag: re.Match[str], inner: str, name: str) -> None:
         values = {key: self._resolve(value) for key, value in ATTRIBUTE.findall(tag[3])}
@@ -179,6 +229,12 @@ def _element_end(text: str, tag: re.Match[str]) -> int:
             if not depth:
                 return other.end()
     return len(text)
+
+
+@cache
+def _known() -> frozenset[str]:
+    """Return the local names of elements that text may contain."""
+    return frozenset({*SPOKEN, *EMPTY, *BESIDE, *_behaviours()})
 
 
 @cache

@@ -65,6 +65,12 @@ def test_feed_never_splits_an_element() -> None:
     ]
 
 
+def test_feed_does_not_wait_for_the_end_of_what_is_no_tag() -> None:
+    clauses = SentenceSplitter()
+    assert clauses.feed("So <sync id='m' there. And so") == ["So <sync id='m' there."]
+    assert SentenceSplitter().feed("So <sync id='m' ref = \"a. b. ") == []
+
+
 def test_feed_splits_first_and_long_sentences_into_clauses() -> None:
     clause = "when all of them had come to the old house by the sea, "
     pieces = cut(clause * 12)

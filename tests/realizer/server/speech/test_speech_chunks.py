@@ -99,7 +99,56 @@ def test_text_block_speaks_all_words_despite_invalid_syncs(syncs: str) -> None:
     assert block["n"].syncs["start"].offset == 1
 
 
-@pytest.mark.parametrize("tag", ['<sync id="m', "<sync", "</prosody", '<realizer:emotion name="joy'])
+UNENDED = 'wanted ">" at the end of a tag, got '
+
+
+@pytest.mark.parametrize(
+    "tag", ['<sync id="m', "<sync", "</prosody", '<realizer:emotion name="joy', "<head lex"]
+)
 def test_text_block_removes_an_incomplete_tag(tag: str) -> None:
-    assert said(text_block(f"Good morning. {tag}", PIECE)).strip() == "Good morning."
+    block = text_block(f"Good morning. {tag}", PIECE)
+    assert said(block).strip() == "Good morning."
+    assert [p.text for p in block.problems] == [f'{UNENDED}"{tag}"']
     assert said(text_block("Is a <b?", PIECE)) == "Is a <b?"
+
+
+@pytest.mark.parametrize(
+    ("markup", "marks", "fault"),
+    [
+        ("<sync id='m' ", ("m",), UNENDED + "\"<sync id='m' there. \""),
+        ('<sync id="m/>', (), UNENDED + '"<sync id="m/>there. "'),
+        ("<synk id='m'/>", (), 'wanted <sync>, SSML or a behaviour, got <synk>, did you mean "sync"?'),
+        ("<haed/>", (), 'wanted <sync>, SSML or a behaviour, got <haed>, did you mean "head"?'),
+        ("<b></b>", (), "wanted <sync>, SSML or a behaviour, got <b>"),
+        ("<sync/>", (), 'wanted <sync id="..."/>, got "<sync/>"'),
+        ("<sync id=m/>", (), 'wanted <sync id="..."/>, got "<sync id=m/>"'),
+        (
+            "<sync id='m'/><sync id='m'/>",
+            ("m",),
+            'sync: wanted an id of its own, got "m" again',
+        ),
+    ],
+)
+def test_text_block_warns_of_faults_in_markup_and_keeps_words(markup: str, marks, fault: str) -> None:
+    block = text_block(f"Hello {markup}there. ", PIECE)
+    assert said(block) == "Hello there. "
+    assert block["turn"].marked == marks
+    assert [(p.id, p.text, p.dropped) for p in block.problems] == [("turn.2:turn", fault, False)]
+
+
+def test_text_block_speaks_the_text_in_a_sync() -> None:
+    block = text_block("Hello <sync id='m'>x</sync> there.", PIECE)
+    assert (said(block), block["turn"].marked) == ("Hello x there.", ("m",))
+    assert [p.text for p in block.problems] == ['wanted an empty <sync/>, got the text "x" in it']
+    assert not text_block("Hello <sync id='m'> </sync><break></break>there.", PIECE).problems
+
+
+def test_text_block_warns_of_markup_that_is_no_xml() -> None:
+    (problem,) = text_block("Hello <emphasis>there.", PIECE).problems
+    assert problem.text.startswith("not well-formed: ")
+    assert problem.text.endswith(": the text is spoken without it")
+
+
+def test_text_block_names_at_most_ten_faults_of_markup() -> None:
+    (problem,) = text_block("".join(f"<{'x' * n}/>a" for n in range(2, 99)), PIECE).problems
+    assert problem.text.count("wanted") == 10
