@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
 
@@ -117,6 +118,20 @@ class AnnouncedBlocks:
             text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
             raise BlockRejectedError(Warning(id_of_block, "IMPOSSIBLE_TO_SCHEDULE", text))
         return waits, waiting
+
+    def unheard(self, announced: AnnouncedBlock) -> Iterator[Warning]:
+        """Yield a warning for each attribute of a block that names one of which nothing was heard before."""
+        block, number = announced.block, announced.number
+        if not (block.interrupt or block.append_after):
+            return
+        known = {playing.block.id: playing.number for playing in reversed(self._blocks.all())}
+        known |= {other.block.id: other.number for other in self.before(announced)}
+        for name, ids in (("interrupt", block.interrupt), ("appendAfter", block.append_after)):
+            for id in ids:
+                if not (known[id] < number if id in known else self._blocks.has_seen(id)):
+                    text = f"{name}: wanted a block, got {id!r}, of which nothing was heard"
+                    yield Warning(block.id, "EXECUTION_FAILURE", text)
+                    break
 
     def place_after(self, playing: ActiveBlock) -> None:
         """Let earlier announced blocks wait for an accepted one that is put before them."""

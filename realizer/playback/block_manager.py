@@ -135,7 +135,7 @@ class BlockManager:
             self.timeline.reorder(follower)
         self._announced.place_after(playing)
         self.timeline.predict(playing, now)
-        for warning in planned.schedule.warnings:
+        for warning in (*planned.schedule.warnings, *self._announced.unheard(announced)):
             self.reports.warn(warning, block.character_id)
         self.timeline.retime(others, planned.other_schedules, now)
         self.timeline.trim(planned.trims, now)

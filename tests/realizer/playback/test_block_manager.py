@@ -286,6 +286,17 @@ def test_on_start_of_an_unknown_block_warns(stage: Stage) -> None:
     assert "! a EXECUTION_FAILURE" in stage.until(9)
 
 
+def test_accept_warns_of_attributes_that_name_unknown_blocks(stage: Stage) -> None:
+    stage.send("a", wait(1))
+    stage.send("b", wait(1), appendAfter="a", interrupt="a", at=2.0)  # it is over
+    stage.send("c", wait(1), appendAfter="a,nobody", interrupt="none", at=3.0)
+    assert [line for line in stage.until(9) if line[0] == "!"] == ["! c EXECUTION_FAILURE"] * 2
+    assert stage.texts == [
+        "interrupt: wanted a block, got 'none', of which nothing was heard",
+        "appendAfter: wanted a block, got 'nobody', of which nothing was heard",
+    ]
+
+
 def test_preplan_block_is_planned_again_when_it_is_activated(stage: Stage) -> None:
     stage.send("p", gaze() + smile(), preplan="true")
     stage.send("a", gaze("h"), onStart="p", at=1.0)

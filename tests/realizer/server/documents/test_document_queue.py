@@ -192,9 +192,9 @@ LATER = f'<bml id="later" characterId="Ann"><wait id="w" duration="3"/>{TALK}</b
     ("head", "body", "warns"),
     [
         ("", '<head id="n" lexeme="NOD" start="later:w:end"/>', ["first:n"]),
-        ('bmla:appendAfter="later"', "", []),
+        ('bmla:appendAfter="later"', "", ["first"]),
         ('bmla:chunkAfter="later"', "", []),
-        ('bmla:interrupt="later"', "", []),
+        ('bmla:interrupt="later"', "", ["first"]),
         ('bmla:prependBefore="later"', "", ["first"]),
     ],
 )
@@ -210,7 +210,7 @@ def test_submission_does_not_link_a_block_to_a_later_one(head, body, warns, orde
     assert [f.id for f in client.feedback if isinstance(f, WarningFeedback)] == warns
     starts = {f.id: f.global_time for f in client.feedback if isinstance(f, BlockProgress)}
     assert starts["later:end"] == 3
-    if "first" not in warns:
+    if "prependBefore" not in head:
         assert (starts["first:start"], starts["first:end"]) == (0, 0.5)
 
 
