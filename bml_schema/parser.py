@@ -226,7 +226,10 @@ class _Reader:
         tag, element = entry.kind.tag, entry.element
         standard = (f"{{{CORE}}}", f"{{{EXTENSIONS}}}")
         if not tag.startswith(standard):
-            return Fault(f"no behaviour {quoted(tag)} is known here", element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
+            space = tag.removesuffix(local(tag))
+            beside = (local(t) for t in self.elements.vocabulary if space and t.startswith(space))
+            text = f"no behaviour {quoted(tag)} is known here{self.names.suggest(local(tag), beside, 0.7)}"
+            return Fault(text, element, CUSTOM_BEHAVIOR_NOT_SUPPORTED)
         name = local(tag)
         elsewhere = [t for t in self.elements.vocabulary if local(t) == name]
         if elsewhere:

@@ -5,6 +5,7 @@ from functools import cache
 
 from realizer.core.errors import UnknownVoiceError, VoiceError
 from realizer.core.registry import Registry
+from realizer.core.similar import did_you_mean, similar
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.utterance import Voice
 
@@ -67,9 +68,10 @@ def find_voice(name: str | None = None) -> Voice:
     engine, _, variant = name.partition(":")
     engine = OTHER_NAMES.get(engine, engine)
     if engine not in VOICES:
-        known = ", ".join(VOICES)
+        known, near = ", ".join(VOICES), did_you_mean(similar(engine, VOICES))
         raise UnknownVoiceError(
-            f"voice: wanted one of {known}, got {name!r}; `realizer voices` says how to install them"
+            f"voice: wanted one of {known}, got {name!r}{near or ';'} "
+            "`realizer voices` says how to install them"
         )
     voice = VOICES[engine]
     if fix := voice.missing():

@@ -189,6 +189,11 @@ def test_parser_drops_the_later_of_two_even_if_the_first_is_bad() -> None:
             "CUSTOM_BEHAVIOR_NOT_SUPPORTED",
             'no behaviour "{urn:q}a" is known here',
         ),
+        (
+            "<q:blnk xmlns:q='urn:bml-realizer:1' id='x'/>",
+            "CUSTOM_BEHAVIOR_NOT_SUPPORTED",
+            'no behaviour "{urn:bml-realizer:1}blnk" is known here, did you mean "blink"?',
+        ),
     ],
 )
 def test_parser_drops_unknown_elements_by_name(inside: str, type: str, said: str) -> None:

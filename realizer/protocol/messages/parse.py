@@ -2,11 +2,13 @@
 
 import json
 import re
+from collections.abc import Iterable
 from typing import Annotated, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
+from realizer.core.similar import similar
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import Control
@@ -67,12 +69,14 @@ def parse_control(text: str, *, can_save: bool = False) -> Control | ErrorMessag
         return ErrorMessage(code="bad-json", message=words)
     kind = message.get("type")
     if kind not in SUPPORTED:
-        words = f"wanted a type of {', '.join(SUPPORTED)}; got {_short(kind)}"
+        # Clients compare the end with the type that they asked for.
+        words = f"wanted a type of {', '.join(SUPPORTED)}{_near(kind, SUPPORTED)}; got {_short(kind)}"
         return ErrorMessage(code="unsupported", message=words, where="type")
     if kind != "save" and len(text) > MAX_CONTROL:
         return _too_large(text)
     if kind == "subscribe" and message.get("stream") not in tuple(STREAMS):
-        words = f"wanted a stream of {', '.join(STREAMS)}; got {_short(message.get('stream'))}"
+        stream = message.get("stream")
+        words = f"wanted a stream of {', '.join(STREAMS)}{_near(stream, STREAMS)}; got {_short(stream)}"
         return ErrorMessage(code="unsupported", message=words, where="subscribe.stream")
     try:
         return _ADAPTER.validate_python(message)
@@ -121,6 +125,11 @@ def _explain(errors: list[ErrorDetails]) -> str:
         return said if ", got " in said else f"{said}; got {got}"
     wanted = [_WANTED[e["type"]].format(**e.get("ctx", {})) for e in errors if e["type"] in _WANTED]
     return f"wanted {' or '.join(dict.fromkeys(wanted))}; got {got}"
+
+
+def _near(value: object, known: Iterable[str]) -> str:
+    near = similar(value, known) if isinstance(value, str) else ()
+    return f" (did you mean {' or '.join(near)}?)" if near else ""
 
 
 def _short(value: object) -> str:

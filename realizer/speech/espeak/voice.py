@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from realizer.core.errors import VoiceError
+from realizer.core.similar import did_you_mean, similar
 from realizer.speech.engine_voice import Engine, EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import read_answer, timeline
@@ -95,7 +96,11 @@ def choose_voice(hello: dict[str, Any], wanted: str | None, language: str) -> tu
     if base and found is None and base in hello["variants"]:  # "f3" alone
         base, variant = "", base
     if base and found is None:
-        warnings.append(f"espeak-ng has no voice {base!r}: the default voice of the language is used")
+        names = {tag for v in hello["voices"] for tag in (v["name"], *(t for _, t in v["languages"]))}
+        near = did_you_mean(similar(base, sorted(names), cutoff=0.7))
+        warnings.append(
+            f"espeak-ng has no voice {base!r}{near or ':'} the default voice of the language is used"
+        )
     if variant and hello["variants"] and variant not in hello["variants"]:
         warnings.append(f"espeak-ng has no variant {variant!r}: the plain voice is used")
         variant = ""

@@ -83,6 +83,8 @@ def test_find_voice_prefers_sound() -> None:
 def test_find_voice_refuses_an_unknown_name() -> None:
     with pytest.raises(UnknownVoiceError, match=f"wanted one of {', '.join(VOICES)}, got 'hal'"):
         find_voice("hal")
+    with pytest.raises(UnknownVoiceError, match=r"got 'expeak:nl', did you mean espeak\?"):
+        find_voice("expeak:nl")
 
 
 @pytest.mark.parametrize("name", ["espeak-ng:nl", pytest.param("hibari-tts", marks=pytest.mark.hibari)])

@@ -50,6 +50,13 @@ def test_parse_control_accepts_every_type() -> None:
         ("{}", "unsupported", "type", "hello, subscribe"),
         ('{"type":"dance"}', "unsupported", "type", '"dance"'),
         ('{"type":["hello"]}', "unsupported", "type", "hello"),
+        ('{"type":"stopp"}', "unsupported", "type", '(did you mean stop?); got "stopp"'),
+        (
+            '{"type":"subscribe","stream":"fapp"}',
+            "unsupported",
+            "subscribe.stream",
+            '(did you mean fap?); got "fapp"',
+        ),
         ('{"type":"speak"}', "unsupported", "type", "hello"),
         ('{"type":"anticipate"}', "invalid", "anticipate.id", "wanted a value; got nothing"),
         ('{"type":"anticipate","id":"a:b","syncs":{}}', "invalid", "anticipate.id", "a string that matches"),

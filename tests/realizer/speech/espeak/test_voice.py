@@ -175,6 +175,10 @@ def test_choose_voice_warns_of_unknown_names(voice: EspeakVoice) -> None:
         "espeak-ng has no variant 'nothing'",
         "espeak-ng does not speak 'xx-YY'",
     ]
+    assert (
+        "no voice 'dutchh', did you mean Dutch? the"
+        in choose_voice(voice._process.hello(), "dutchh", "en")[1][0]
+    )
 
 
 @pytest.mark.parametrize(
