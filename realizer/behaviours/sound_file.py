@@ -105,7 +105,8 @@ def read_wav(content: bytes) -> tuple[int, Int16]:
 def _chunks(content: bytes) -> Iterator[tuple[bytes, bytes]]:
     """Yield the name and content of each chunk; a chunk may be cut off at the end."""
     if content[:4] != b"RIFF" or content[8:12] != b"WAVE":
-        raise RealizerError("wanted a WAV file, got something else")
+        got = f"one that begins with {content[:8]!r}" if content else "an empty one"
+        raise RealizerError(f"wanted a WAV, FLAC, Ogg, MP3 or WebM file, got {got}")
     at = 12
     while at + 8 <= len(content):
         name, size = struct.unpack_from("<4sI", content, at)

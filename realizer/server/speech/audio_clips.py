@@ -172,9 +172,12 @@ class AudioClips:
         phonemes = [*message.phonemes, *_phonemes(message)]
         clip = self._clips.get(message.clip) or Clip()
         old = Clip() if clip.is_annotated else clip
-        for name, known, new in (("words", old.words, message.words), ("phonemes", old.phonemes, phonemes)):
-            if any(later.start < sooner.start for sooner, later in pairwise((*known[-1:], *new))):
-                raise ClipError(f"speech.{name}", "wanted times that rise, got some that go back")
+        sounds = "visemes" if message.visemes else "phonemes"
+        for name, known, new in (("words", old.words, message.words), (sounds, old.phonemes, phonemes)):
+            for sooner, later in pairwise((*known[-1:], *new)):
+                if later.start < sooner.start:
+                    got = f"{later.start:g} s after {sooner.start:g} s"
+                    raise ClipError(f"speech.{name}", f"wanted times that rise, got {got}")
             if len(known) + len(new) > MAX_TIMES:
                 raise ClipError(f"speech.{name}", f"wanted at most {MAX_TIMES}, got more")
         self._changed.add(message.clip)

@@ -105,8 +105,12 @@ def test_read_wav_of_a_cut_file_gives_what_is_left() -> None:
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"", "wanted a WAV file"),
-        (b"OggS and more", "wanted a WAV file"),
+        (b"", "wanted a WAV, FLAC, Ogg, MP3 or WebM file, got an empty one"),
+        (
+            b"no sound at all",
+            "wanted a WAV, FLAC, Ogg, MP3 or WebM file, got one that begins with b'no sound'",
+        ),
+        (b"OggS and more", "got one that begins with b'OggS and'"),
         (b"RIFF\0\0\0\0WAVE", "with a format and data"),
         (wav(b""), "without samples"),
         (wav(b"12345678", coding=2, bits=4), "got coding 2 of 4 bits"),

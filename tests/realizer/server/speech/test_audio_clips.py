@@ -133,6 +133,7 @@ def test_add_chunk_removes_the_oldest_clips(monkeypatch) -> None:
     ("fields", "where"),
     [
         ({"words": [{"start": 1, "text": "a"}, {"start": 0, "text": "b"}]}, "speech.words"),
+        ({"visemes": [{"start": 1, "text": "aa"}, {"start": 0, "text": "PP"}]}, "speech.visemes"),
         ({"visemes": [{"start": 0, "viseme": "PPP"}]}, "speech.visemes"),
         ({"visemes": [{"start": 0, "viseme": 1}], "viseme_set": "mine"}, "speech.visemes"),
     ],
