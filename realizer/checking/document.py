@@ -5,12 +5,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from bml_schema import Behaviour, Block, BMLError, Problem, Required, read
+from bml_schema import Behaviour, Block, BMLError, ParameterValueChange, Problem, Required, read
 from bml_schema.source import Source
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import VOCABULARY
 from realizer.checking.explain import attributes_of, finding_of
 from realizer.checking.finding import Finding
+from realizer.playback.block_commands import CommandError, initial_value
 from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech, synthesize
@@ -83,8 +84,27 @@ def check_block(
     # The block must not fail for known faults before its constraints are checked.
     whole = replace(block, problems=(), children=tuple(_without_required(block, bad)))
     schedule = submit_with_speech(player, whole, SilentVoice())
+    warnings += change_faults(block, player)
     known = {(warning.id, warning.text) for warning in warnings}
     return schedule, warnings + [w for w in schedule.warnings if (w.id, w.text) not in known]
+
+
+def change_faults(block: Block, player: Player) -> Iterator[Warning]:
+    """Yield the faults that changes of parameters would have while they play, if their targets are known."""
+    for act in block.behaviours:
+        if not isinstance(act, ParameterValueChange):
+            continue
+        id, behaviour = act.target
+        playing = player.blocks.find(id)
+        target = block if id == block.id else None if playing is None else playing.block
+        node = next((n for n in target.behaviours if n.id == behaviour), None) if target else None
+        try:
+            if node is not None and node.tag in player.kinds:
+                initial_value(act, node, player.kinds)
+            elif target is not None:
+                raise CommandError(f"target: wanted a behaviour of {id}, got {id}:{behaviour}")
+        except CommandError as fault:
+            yield located_warning(block, act.id, "EXECUTION_FAILURE", str(fault))
 
 
 def _without_required(block: Block, bad: set[str]) -> Iterator[Any]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
-from bml_schema import Activate, Interrupt, ParameterValueChange
+from bml_schema import Activate, Behaviour, Interrupt, ParameterValueChange
 from realizer.animation.channel import Gain
-from realizer.behaviours.kind import BlockCommand
+from realizer.behaviours.kind import BehaviourKind, BlockCommand
+from realizer.core.similar import did_you_mean, similar
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.timeline import BlockTimeline
 
@@ -61,25 +63,34 @@ def _interrupt(blocks: Blocks, act: Interrupt, now: float) -> None:
         blocks.timeline.cut(target, left & chosen, now)
 
 
+def initial_value(act: ParameterValueChange, target: Behaviour, kinds: Mapping[str, BehaviourKind]) -> float:
+    """Return the value of the parameter that an act changes as its target began with.
+
+    Raises:
+        CommandError: the target has no such parameter, or it cannot have the values of the act.
+    """
+    known, id = kinds[target.tag].parameters, ":".join(act.target)
+    if act.param_id not in known:
+        names, near = ", ".join(sorted(known)) or "none", did_you_mean(similar(act.param_id, known))
+        raise CommandError(f"paramId: {id} has {names}, got {act.param_id!r}{near}")
+    usual = known[act.param_id]
+    value = float(getattr(target, usual) if isinstance(usual, str) else usual)
+    if value <= 0.0:
+        raise CommandError(f"{act.param_id}: wanted one that was above 0, got {id} at 0")
+    least = min(act.trajectory.target_value, act.trajectory.initial_value or 0)
+    if least < 0:
+        raise CommandError(f"{act.param_id}: wanted 0 or more, got {least:g}")
+    return value
+
+
 def _change(blocks: Blocks, act: ParameterValueChange, now: float, end: float) -> None:
     """Change a parameter linearly if the document gives an end and wants that, otherwise at once."""
     block, behaviour = act.target
     target = blocks.timeline.blocks.find(block)
     if target is None or behaviour not in target.unfinished(now) or not target.has_begun:
         raise CommandError(f"target: wanted a behaviour that plays, got {block}:{behaviour}")
-    node = target.block[behaviour]
-    known = target.kinds[node.tag].parameters
-    if act.param_id not in known:
-        names = ", ".join(sorted(known)) or "none"
-        raise CommandError(f"paramId: {block}:{behaviour} has {names}, got {act.param_id!r}")
-    usual = known[act.param_id]
-    unscaled = float(getattr(node, usual) if isinstance(usual, str) else usual)
-    if unscaled <= 0.0:
-        raise CommandError(f"{act.param_id}: wanted one that was above 0, got {block}:{behaviour} at 0")
+    unscaled = initial_value(act, target.block[behaviour], target.kinds)
     initial, to = act.trajectory.initial_value, act.trajectory.target_value
-    least = min(to, initial or 0)
-    if least < 0:
-        raise CommandError(f"{act.param_id}: wanted 0 or more, got {least:g}")
     sound = act.param_id == "volume"
     reached = now + AT_ONCE[sound]
     gains = [] if initial is None else [Gain(now, reached, initial / unscaled)]

@@ -44,6 +44,27 @@ def test_check_document_marks_a_fault(text: str, marked: str) -> None:
     assert (line, text[column - 1 : column - 1 + length]) == (1, marked)
 
 
+@pytest.mark.parametrize(
+    ("target", "parameter", "fault"),
+    [
+        ("a:n", "amount", None),
+        ("a:n", "ammount", "paramId: a:n has amount, got 'ammount', did you mean amount?"),
+        ("a:m", "amount", "target: wanted a behaviour of a, got a:m"),
+        ("c:n", "volume", "paramId: c:n has amount, got 'volume'"),
+        ("elsewhere:m", "loudness", None),
+    ],
+)
+def test_check_document_finds_faults_of_changes_of_parameters(target, parameter, fault) -> None:
+    change = (
+        f'<bmla:parametervaluechange id="p" target="{target}" paramId="{parameter}" start="0.2" '
+        'xmlns:bmla="http://www.asap-project.org/bmla"><trajectory type="linear" targetValue="1"/>'
+        "</bmla:parametervaluechange>"
+    )
+    changes = f'<bml id="c"><head id="n" lexeme="NOD"/>{change}</bml>'
+    found = [f.text for f in findings(GOOD + changes)]
+    assert found == ([] if fault is None else [fault])
+
+
 def test_check_document_has_findings_for_each_block() -> None:
     bad = '<bml id="b"><head id="n" lexeme="NIX"/></bml>'
     text = GOOD + "\n" + bad + '\n<bml id="c"><head'
