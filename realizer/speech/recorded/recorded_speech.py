@@ -21,7 +21,8 @@ EDGE = 1e-4  # s
 SIDE = 1e-3  # letters
 # s by which times may be wrong without a warning, as those of many voices are
 SLACK = 0.1
-OVERLAP = {"words": 0.1, "phonemes": 0.03}
+SOUNDS = "phonemes or visemes"
+OVERLAP = {"words": 0.1, SOUNDS: 0.03}
 MILLISECONDS = 10  # lengths of the sound after which a time is probably in another unit
 STEP = 0.02  # s between the instants at which sounds are compared
 CACHED = 8  # recordings; a document is planned more than once before it plays
@@ -102,7 +103,7 @@ def _checked(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Return a recording with the words and phonemes that can be used, and what is wrong with the others."""
     duration = len(recording.pcm) / recording.rate
     words, wrong = _usable("words", recording.words, duration)
-    phonemes, more = _usable("phonemes", recording.phonemes, duration)
+    phonemes, more = _usable(SOUNDS, recording.phonemes, duration)
     if (words, phonemes) != (recording.words, recording.phonemes):
         recording = replace(recording, words=words, phonemes=phonemes)
     return recording, (*wrong, *more)
@@ -136,7 +137,7 @@ def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple
             f"{_text_of(two)!r} from {two.start:.2f} s on{_more(torn)}"
         )
     if mute:
-        faults.append(f'wanted {kind} in IPA, or "" for a pause, got {mute[0]!r}{_more(mute)}')
+        faults.append(f'wanted phonemes in IPA, or "" for a pause, got {mute[0]!r}{_more(mute)}')
     good = sum(item.start < min(item.end, duration) for item, _ in spoken) - len(mute)
     if spoken and (good <= 0 or 2 * good < len(spoken)):
         return (), [*faults, f"these {kind} are not used"]

@@ -148,7 +148,7 @@ def test_utterance_of_warns_of_words_in_wrong_places(words, faults) -> None:
 
 
 PHONEMES = (Phoneme(0.2, 0.5, "m"), Phoneme(0.5, 0.8, "a"), Phoneme(0.8, 1.0, ""))
-LATE = "wanted phonemes that begin within the 2.00 s of the sound, got "
+LATE = "wanted phonemes or visemes that begin within the 2.00 s of the sound, got "
 
 
 @pytest.mark.parametrize(
@@ -157,11 +157,11 @@ LATE = "wanted phonemes that begin within the 2.00 s of the sound, got "
         ((*PHONEMES, Phoneme(1.0, 1.2, "m"), Phoneme(7, 8, "a")), LATE + "'a' at 7.00 s"),
         (
             (*PHONEMES, Phoneme(1.0, 1.2, "m"), Phoneme(1.1, 1.2, "a")),
-            "wanted phonemes that follow each other, got 'm' up to 1.20 s and 'a' from 1.10 s on",
+            "wanted phonemes or visemes that follow each other, got 'm' up to 1.20 s and 'a' from 1.10 s on",
         ),
         (
             (*PHONEMES, Phoneme(1.2, 1.0, "m")),
-            "wanted phonemes that begin before they end, got 'm' from 1.20 s to 1.00 s",
+            "wanted phonemes or visemes that begin before they end, got 'm' from 1.20 s to 1.00 s",
         ),
         ((*PHONEMES, Phoneme(1, 1.2, "?!")), "wanted phonemes in IPA, or \"\" for a pause, got '?!'"),
     ],
@@ -182,12 +182,12 @@ def test_utterance_of_warns_of_a_wrong_phoneme_and_uses_the_others(phonemes, fau
         ((Phoneme(0.5, 1, "7"),), "wanted phonemes in IPA, or \"\" for a pause, got '7'"),
         (
             (Phoneme(0.9, 0.4, "m"),),
-            "wanted phonemes that begin before they end, got 'm' from 0.90 s to 0.40 s",
+            "wanted phonemes or visemes that begin before they end, got 'm' from 0.90 s to 0.40 s",
         ),
     ],
 )
 def test_utterance_of_wrong_phonemes_uses_words_text_or_sound(phonemes, fault) -> None:
-    unused = "these phonemes are not used"
+    unused = "these phonemes or visemes are not used"
     with_words = said(words=WORDS, phonemes=phonemes)
     assert with_words.warnings == (fault, unused)
     assert with_words.phonemes == said(words=WORDS).phonemes
