@@ -137,7 +137,7 @@ test("a connection that is lost is restored with its streams", async () => {
 
 test("play rejects a block whose session has ended meanwhile", async () => {
   const end = realizer.play('<bml id="cut"><wait id="w" duration="30"/></bml>');
-  await new Promise((resolve) => (realizer.onfeedback = (element) => element.getAttribute("id") === "cut:start" && resolve()));
+  await new Promise((resolve) => (realizer.onfeedback = (element) => element.getAttribute("id") === "cut:w:start" && resolve()));
   realizer.seen = 1e6; // more than a new session has sent
   realizer.socket.close();
   await assert.rejects(end, { code: "gap" });
