@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 from realizer import tables
+from realizer.speech.ssml import EMPTY
 
 # A tag; groups: "/" of an end tag, name, attributes, "/" of an empty element.
 TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
@@ -14,6 +15,7 @@ BEGUN = re.compile(  # an incomplete tag
     r"\s*(?:/|[\w.:-]+\s*(?:=\s*(?:\"[^\"]*|'[^']*|[^\s\"'<>/]*))?)?)?$"
 )
 ENTITY = re.compile(r"&#?\w{1,10}$")  # an entity without its semicolon
+CONTENTLESS = frozenset({*EMPTY, "br"})  # elements whose end tag no text waits for; "br" of HTML is common
 MAX_TAG = 2000  # characters; longer text after "<" is not a tag
 MAX_TEXT = 20_000  # characters; longer text does not wait for an end tag
 
@@ -65,7 +67,8 @@ def _end(text: str, *, first: bool, closed: bool) -> int | None:
         if text[at] == "<":
             tag = TAG.match(text, at)
             if tag is not None:
-                depth = max(0, depth + (-1 if tag[1] else 0 if tag[4] else 1))
+                if tag[2].rpartition(":")[2] not in CONTENTLESS:
+                    depth = max(0, depth + (-1 if tag[1] else 0 if tag[4] else 1))
                 at = tag.end()
                 continue
             if not closed and BEGUN.match(text[at : at + MAX_TAG]):

@@ -71,6 +71,11 @@ def test_feed_does_not_wait_for_the_end_of_what_is_no_tag() -> None:
     assert SentenceSplitter().feed("So <sync id='m' ref = \"a. b. ") == []
 
 
+@pytest.mark.parametrize("tag", ["<sync id='m'>", "<br>"])
+def test_feed_does_not_wait_for_the_end_of_an_element_without_content(tag: str) -> None:
+    assert SentenceSplitter().feed(f"So {tag}there. And so") == [f"So {tag}there."]
+
+
 def test_feed_splits_first_and_long_sentences_into_clauses() -> None:
     clause = "when all of them had come to the old house by the sea, "
     pieces = cut(clause * 12)
