@@ -182,9 +182,7 @@ def _point(name: str, attributes: Mapping[str, str], odd: list[str]) -> Iterator
         yield Break(min(seconds, LONGEST_BREAK))
     else:
         # SSML <mark name>, SAPI <bookmark mark>, BML <sync id>.
-        named = next((attributes[k] for k in ("name", "mark", "id") if k in attributes), None)
-        if named is not None:
-            yield Mark(named)
+        yield Mark(next((attributes[k] for k in ("name", "mark", "id") if k in attributes), ""))
 
 
 def _scrape(ssml: str) -> Iterator[Part]:

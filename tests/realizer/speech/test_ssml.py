@@ -39,6 +39,12 @@ def test_read_script_reads_bml_syncs_as_marks() -> None:
     assert read_script(SpeechRequest('a <bml:sync id="x"/>b')).marks == ("x",)
 
 
+@pytest.mark.parametrize("mark", ["<mark/>", '<mark name=""/>', "<sync/>"])
+def test_read_script_warns_of_a_mark_without_a_name(mark: str) -> None:
+    script = read_script(SpeechRequest(f"one {mark}two"))
+    assert (script.marks, script.warnings) == ((), ("a mark without a name is ignored",))
+
+
 def test_read_script_limits_the_length() -> None:
     assert read_script(SpeechRequest("a" * MAX_TEXT)).text
     with pytest.raises(VoiceError, match="split it"):
