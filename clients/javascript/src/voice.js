@@ -123,9 +123,10 @@ export function timed(name, items) {
   return Array.from(items, (item, k) => {
     const fields = Array.isArray(item) ? item : [item?.start, item?.end, item?.text];
     const [start, end, text] = fields.length === 2 ? [fields[0], undefined, fields[1]] : fields;
-    if (!(start >= 0) || typeof text !== "string") {
+    if (typeof start !== "number" || typeof text !== "string") {
       throw new TypeError(`${name}[${k}]: wanted [seconds, text] or [start, end, text], got ${JSON.stringify(item)}`);
     }
+    if (!(start >= 0)) throw new RangeError(`${name}[${k}]: wanted seconds from 0 on, got ${JSON.stringify(item)}`);
     return { start, ...(end === undefined ? {} : { end }), text };
   });
 }
