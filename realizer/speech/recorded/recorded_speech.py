@@ -138,8 +138,9 @@ def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple
         )
     if mute:
         faults.append(f'wanted phonemes in IPA, or "" for a pause, got {mute[0]!r}{_more(mute)}')
-    good = sum(item.start < min(item.end, duration) for item, _ in spoken) - len(mute)
-    if spoken and (good <= 0 or 2 * good < len(spoken)):
+    bad = set(mute)
+    good = sum(item.start < min(item.end, duration) and text not in bad for item, text in spoken)
+    if spoken and (not good or 2 * good < len(spoken)):
         return (), [*faults, f"these {kind} are not used"]
     return tuple(replace(item, end=max(item.start, item.end)) for item in given), faults
 

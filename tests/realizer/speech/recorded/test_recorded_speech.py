@@ -206,6 +206,10 @@ def test_utterance_of_wrong_words_aligns_the_text() -> None:
     assert utterance.phonemes == said().phonemes
 
 
+def test_utterance_of_counts_a_phoneme_with_two_faults_once() -> None:
+    assert "not used" not in " ".join(said(phonemes=(*PHONEMES, Phoneme(8, 9, "7"))).warnings)
+
+
 def test_utterance_of_pauses_alone_stays_silent() -> None:
     utterance = said(phonemes=(Phoneme(0, 1, ""), Phoneme(1, 900, " ")))
     assert utterance.warnings == ()
