@@ -13,10 +13,10 @@ from typing import Any, Unpack
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
+from realizer.client.errors import ClientError
 from realizer.client.message_router import (
     Arrivals,
     BlockWaiter,
-    ClientError,
     Frame,
     Playout,
     Receiver,

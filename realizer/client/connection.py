@@ -5,7 +5,7 @@ from __future__ import annotations
 from errno import ECONNREFUSED
 
 from realizer.client.async_client import Client
-from realizer.client.message_router import ClientError
+from realizer.client.errors import ClientError
 from realizer.client.sync_client import SyncClient
 from realizer.protocol.messages.common import PROTOCOL
 

@@ -8,10 +8,10 @@ import time
 from collections import deque
 from dataclasses import replace
 from html import unescape
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
-from realizer.core.errors import RealizerError
+from realizer.client.errors import ClientError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import JSON_STREAMS
 from realizer.protocol.wire import WireFrame, unpack
@@ -24,23 +24,6 @@ _COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
 _BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
 Frame = WireFrame[Any] | dict[str, Any]
-
-
-class ClientError(RealizerError):
-    """The service refused a message, or the connection has ended.
-
-    Attributes:
-        code: as in the message `error`; "refused" for a block, "connection" for the end.
-    """
-
-    def __init__(self, text: str, code: str = "connection") -> None:
-        super().__init__(text)
-        self.code = code
-
-    @classmethod
-    def of(cls, error: dict[str, Any]) -> Self:
-        """Return the exception for a message `error`."""
-        return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
 
 
 def is_blank(bml: str) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from bml_schema.feedback import BlockProgress
-from realizer.client.message_router import ClientError
+from realizer.client.errors import ClientError
 from realizer.core.array_types import Int16, UInt8
 from realizer.core.atomic_files import replacing
 from realizer.core.units import frame_count

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Self
 
 from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
-from realizer.client.message_router import ClientError
+from realizer.client.errors import ClientError
 
 LONGEST = 20_000  # characters of one message
 # Text that follows sooner goes with the next message: a service limits the rate of messages, and a stop would

@@ -8,7 +8,7 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, Unpack
 
 from realizer.client.async_client import Client
-from realizer.client.message_router import ClientError
+from realizer.client.errors import ClientError
 from realizer.client.speech import OpenSpeech, Speech
 from realizer.client.stream_options import SpeechOptions
 from realizer.client.voice import Voice

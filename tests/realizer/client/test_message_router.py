@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from realizer.client.errors import ClientError
 from realizer.client.message_router import (
     MAX_FRAMES,
     MEMORY,
     BlockWaiter,
-    ClientError,
     Playout,
     Router,
     is_blank,
