@@ -272,8 +272,9 @@ class Submission:
 
 
 def block_id_of(message: str) -> str:
-    """Return the block id near the start of an unparsed document, or "<no id>"."""
-    match = _BLOCK_ID.search(message, 0, 4096)
+    """Return the id of the last block of an unparsed message, for whose end clients wait, or "<no id>"."""
+    begin = max(0, *(message.rfind(f"<bml{blank}") for blank in " \t\r\n"))
+    match = _BLOCK_ID.search(message, begin, begin + 4096)
     return match[1] if match else "<no id>"
 
 

@@ -8,7 +8,7 @@ from bml_schema import Block, BlockProgress, PredictionFeedback, WarningFeedback
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
-from realizer.server.documents.document_queue import DocumentQueue, size_error
+from realizer.server.documents.document_queue import DocumentQueue, block_id_of, size_error
 from realizer.server.session.due_work import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
@@ -39,6 +39,21 @@ def test_document_queue_refuses_a_long_message_with_its_block_id() -> None:
     assert (refused.id, refused.type) == ("a", "PARSING_FAILURE")
     assert "at most 40 bytes" in refused.text
     assert not queue
+
+
+@pytest.mark.parametrize(
+    ("message", "block"),
+    [
+        (WAIT.format("a") + WAIT.format("b"), "b"),
+        (WAIT.format("a") + 5000 * " ", "a"),
+        ('<bml id="a"><bmla:interrupt target="x"/></bml>', "a"),
+        ('<x:bml id="a"/>', "a"),
+        ("<bml/>", "<no id>"),
+    ],
+    ids=["several", "long", "prefix behind", "prefix", "none"],
+)
+def test_block_id_of_is_that_of_the_last_block(message: str, block: str) -> None:
+    assert block_id_of(message) == block
 
 
 def names(queue: DocumentQueue) -> str:
