@@ -13,16 +13,9 @@ from typing import Any, Unpack
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
+from realizer.client.block_waiters import BlockWaiter, BlockWaiters, is_control
 from realizer.client.errors import ClientError
-from realizer.client.message_router import (
-    Arrivals,
-    BlockWaiter,
-    Frame,
-    Playout,
-    Receiver,
-    Router,
-    is_blank,
-)
+from realizer.client.message_router import Arrivals, Frame, Playout, Receiver, Router
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
 from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
@@ -115,6 +108,9 @@ class Client:
     async def play(self, bml: str) -> BlockProgress:
         """Send BML, wait for the end of its last block, and return that.
 
+        Feedback names blocks by their ids only. If several connections of a session send an id at the same
+        time, this may return the end of the block of another one, though its own was refused.
+
         Raises:
             ClientError: the block was refused, or the connection ended.
             TypeError: `bml` is no string.
@@ -127,13 +123,12 @@ class Client:
         """Send BML and return a waiter, which follows the start and the end of its last block.
 
         Raises:
-            ClientError: the text is blank, or the connection has ended.
+            ClientError: the text is blank or a control message, or the connection has ended.
         """
-        if is_blank(bml):
-            raise ClientError("wanted <bml>, got nothing", "refused")
-        self._router.on_sent(bml)
-        block = BlockWaiter(self._router.last_block)
-        self._router.add_listener(block)
+        block = self._router.on_sent(bml)
+        if block is None:
+            got = "a control message, which `control` and `ask` send" if is_control(bml) else "nothing"
+            raise ClientError(f"wanted <bml>, got {got}", "refused")
         await self._post(bml)
         return block
 
@@ -160,7 +155,7 @@ class Client:
         """
         speech = Speech(id, opening, self.control, self.wait_for, self._check)
         speech.earlier, self._speeches[id] = self._speeches.get(id), speech
-        self._router.add_listener(speech.progress)
+        self._router.waiters.add(speech.progress)
         return speech
 
     def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> Voice:
@@ -174,7 +169,7 @@ class Client:
         """
         fields = opening if language is None else {**opening, "language": language}
         voice = Voice(rate, fields, self._post, self.control, self.wait_for)
-        self._router.add_listener(voice.progress)
+        self._router.waiters.add(voice.progress)
         return voice
 
     async def say(
@@ -224,13 +219,29 @@ class Client:
                 yield self._router.feedback.popleft()
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
-        """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent."""
-        waiter = BlockWaiter(block or self._router.last_block)
-        async for feedback in self.feedback():
-            yield feedback
-            waiter.on_feedback(feedback)
-            if waiter.is_finished:
-                return
+        """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent.
+
+        Args:
+            block: an id; another client may send this block, also later: without it, this waits.
+
+        Raises:
+            ValueError: nothing was sent, so that there is no last block.
+        """
+        waiter = self._router.last_sent if block is None else BlockWaiter(block, is_acknowledged=True)
+        if waiter is None:
+            raise ValueError("block: wanted an id, because no BML was sent last")
+        # What was sent is followed already.
+        waiters, queue = BlockWaiters() if block is None else BlockWaiters(waiter), self._router.feedback
+        with contextlib.suppress(ClientError):
+            while True:
+                await self.wait_for(lambda: bool(queue) or waiter.is_finished)
+                if not queue:
+                    return  # its end was taken from the queue before
+                feedback = queue.popleft()
+                yield feedback
+                waiters.on_feedback(feedback)
+                if feedback is waiter.last:
+                    return
 
     async def frames(self, stream: str) -> AsyncIterator[Frame]:
         """Yield frames of a stream as they arrive: WireFrame, or a dictionary if the encoding is JSON.

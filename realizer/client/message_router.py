@@ -3,14 +3,13 @@
 import json
 import logging
 import math
-import re
 import time
 from collections import deque
 from dataclasses import replace
-from html import unescape
 from typing import Any, Protocol
 
-from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, WarningFeedback, parse_feedback
+from bml_schema.feedback import Feedback, WarningFeedback, parse_feedback
+from realizer.client.block_waiters import BlockWaiter, BlockWaiters, waiters_of
 from realizer.client.errors import ClientError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import JSON_STREAMS
@@ -20,29 +19,8 @@ from realizer.protocol.wire import WireFrame, unpack
 MAX_FRAMES = 1_000
 MAX_FEEDBACK = 10_000
 _LOG = logging.getLogger("realizer.client")
-_COMMENT = re.compile(r"<!--.*?-->|<\?.*?\?>", re.DOTALL)
-_BLOCK_ID = re.compile(r"<(?:\w+:)?bml\b[^<>]*?\bid\s*=\s*[\"']([^\"'<>]+)[\"']")
 
 Frame = WireFrame[Any] | dict[str, Any]
-
-
-def is_blank(bml: str) -> bool:
-    """Return whether a text contains nothing that the service would answer; TypeError: it is no text."""
-    if not isinstance(bml, str):
-        raise TypeError(f"bml: wanted a string, got {bml!r:.60}")
-    return not _COMMENT.sub("", bml).strip()
-
-
-class Listener(Protocol):
-    """A listener to all feedback until it is finished; most feedback is of other blocks."""
-
-    @property
-    def is_finished(self) -> bool: ...
-
-    def on_feedback(self, feedback: Feedback) -> None: ...
-
-    def on_error(self, error: dict[str, Any]) -> None:
-        """Handle an error about a message that has no answer."""
 
 
 class Receiver(Protocol):
@@ -67,6 +45,8 @@ class Router:
     Attributes:
         receivers: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
         errors: errors about messages without an answer, and of video streams that ended.
+        waiters: of the blocks and speeches that were sent and have not ended.
+        last_sent: the waiter for the last block of the last text.
     """
 
     def __init__(self) -> None:
@@ -74,10 +54,10 @@ class Router:
         self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
         self.frames: dict[str, deque[Frame]] = {}
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
-        self.last_block: str | None = None
+        self.waiters = BlockWaiters()
+        self.last_sent: BlockWaiter | None = None
         self._request: str | None = None
         self._answer: dict[str, Any] | None = None
-        self._listeners: list[Listener] = []
         self._streams: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> its description
 
     def receive(self, message: str | bytes) -> None:
@@ -101,13 +81,14 @@ class Router:
             self.feedback.append(feedback)
             if isinstance(feedback, WarningFeedback):
                 _LOG.warning("%s: %s: %s", feedback.id, feedback.type, feedback.text)
-            for listener in self._listeners:
-                listener.on_feedback(feedback)
-            self._listeners = [listener for listener in self._listeners if not listener.is_finished]
+            self.waiters.on_feedback(feedback)
 
-    def on_sent(self, bml: str) -> None:
-        ids = _BLOCK_ID.findall(_COMMENT.sub("", bml))
-        self.last_block = unescape(ids[-1]) if ids else None
+    def on_sent(self, bml: str) -> BlockWaiter | None:
+        """Return a waiter for the last block of a text; None if the service will not answer the text."""
+        added = waiters_of(bml)
+        self.waiters.add(*added)
+        self.last_sent = added[-1] if added else None
+        return self.last_sent
 
     def queue_of(self, stream: str) -> deque[Frame]:
         """Return the newest messages of a stream; all of `schedule`, as each is the difference to others."""
@@ -127,10 +108,6 @@ class Router:
             raise ClientError.of(self._answer)
         return self._answer
 
-    def add_listener(self, listener: Listener) -> None:
-        """Pass all feedback to a listener from now on, beside the queue."""
-        self._listeners.append(listener)
-
     def _reply(self, reply: dict[str, Any]) -> None:
         request = self._request
         if reply["type"] in ("subscribed", "changed"):
@@ -148,56 +125,13 @@ class Router:
         if is_answer and request is not None:
             self._request, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
+            is_repeated = (
+                bool(self.errors) and self.errors[-1] == reply
+            )  # by each message of a refused speech
             self.errors.append(reply)
-            if reply["type"] == "error":
+            if reply["type"] == "error" and not is_repeated:
                 _LOG.warning("%s", ClientError.of(reply))
-            for listener in self._listeners:
-                listener.on_error(reply)
-
-
-class BlockWaiter:
-    """A listener that waits for the end of a block, or the warning that refuses it.
-
-    Attributes:
-        start: when the block started, seconds on the session clock, or None.
-        last: the feedback that ended it, or None.
-    """
-
-    def __init__(self, block: str | None) -> None:
-        self.block = block
-        self.start: float | None = None
-        self.last: BlockProgress | WarningFeedback | None = None
-        self._planned = False
-
-    @property
-    def is_finished(self) -> bool:
-        return self.last is not None
-
-    def on_feedback(self, feedback: Feedback) -> None:
-        match feedback:
-            case BlockProgress(id=id) if id == f"{self.block}:start":
-                self.start = feedback.global_time
-            case BlockProgress(id=id) if id == f"{self.block}:end":
-                self.last = self.last or feedback
-            case WarningFeedback(id=id) if id == (self.block or "<no id>") and not self._planned:
-                # A warning about the block itself refuses it, unless a prediction has accepted it before.
-                self.last = self.last or feedback
-            case PredictionFeedback():
-                self._planned |= any(b.id == self.block and b.status != "IN_PREP" for b in feedback.blocks)
-
-    def on_error(self, error: dict[str, Any]) -> None:
-        """Ignore errors: those of blocks are feedback."""
-
-    def end(self) -> BlockProgress:
-        """Return the feedback at the end of the block.
-
-        Raises:
-            ClientError: the block was refused.
-        """
-        if isinstance(self.last, BlockProgress):
-            return self.last
-        assert self.last is not None
-        raise ClientError(f"{self.last.id}: {self.last.text}", "refused")
+            self.waiters.on_error(reply)
 
 
 # A consumer that is slower than the frames loses the oldest ones.

@@ -6,7 +6,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Self
 
-from bml_schema.feedback import BlockProgress, Feedback, SyncPointProgress, WarningFeedback
+from bml_schema.feedback import BlockProgress, SyncPointProgress
+from realizer.client.block_waiters import BlockWaiter
 from realizer.client.errors import ClientError
 
 LONGEST = 20_000  # characters of one message
@@ -19,49 +20,41 @@ Control = Callable[..., Awaitable[None]]
 Wait = Callable[[Callable[[], bool]], Awaitable[None]]
 
 
-class SpeechProgress:
-    """A listener to the feedback of one speech.
+class SpeechProgress(BlockWaiter):
+    """A waiter for the syncs and the end of one speech.
 
     Attributes:
         points: sync of the text -> when it was spoken, seconds on the session clock.
-        end: the feedback at its end, or None; it has `said` if the speech was cut off.
-        refused: why the speech was refused, or None.
         fault: the error about its messages, or None: a closed speech of that id is still being spoken.
     """
 
     def __init__(self, id: str) -> None:
-        self._id = id
+        super().__init__(id)
+        self.is_sent = False
         self.points: dict[str, float] = {}
-        self.end: BlockProgress | None = None
-        self.refused: str | None = None
         self.fault: dict[str, Any] | None = None
 
-    def on_error(self, error: dict[str, Any]) -> None:
+    def on_sync_point(self, feedback: SyncPointProgress) -> None:
+        _, behaviour, sync = feedback.id.split(":", 2)
+        if behaviour == self.block:
+            self.points.setdefault(sync, feedback.global_time)
+
+    def on_error(self, error: dict[str, Any]) -> bool:
         where = str(error.get("where"))
         # An error about a part of a clip has only the clip; that about a message that is too long, no id.
-        is_clip = where.startswith(f"clip:{self._id}-") or error.get("code") == "too-large"
-        if self.fault is None and (is_clip or (error.get("id") == self._id and where != "speech.append")):
-            self.fault = error
+        is_clip = where.startswith(f"clip:{self.block}-") or error.get("code") == "too-large"
+        if is_clip or (error.get("id") == self.block and where != "speech.append"):
+            self.fault = self.fault or error
+        return self.fault is not None and error.get("id") == self.block
 
     def check(self) -> None:
         """Raise ClientError if the service has refused the messages."""
         if self.fault is not None:
             raise ClientError.of(self.fault)
 
-    def on_feedback(self, feedback: Feedback) -> None:
-        match feedback:
-            case SyncPointProgress(id=id):
-                block, behaviour, sync = id.split(":", 2)
-                if behaviour == self._id and block.rpartition(".")[0] == self._id:
-                    self.points.setdefault(sync, feedback.global_time)
-            case BlockProgress(id=id) if id == f"{self._id}:end":
-                self.end = feedback
-            case WarningFeedback(id=id) if id == self._id:
-                self.refused = feedback.text
-
     @property
     def is_finished(self) -> bool:
-        return any(reason is not None for reason in (self.end, self.refused, self.fault))
+        return self.last is not None or self.fault is not None
 
     def point(self, sync: str) -> float:
         """Return when a sync was spoken.
@@ -71,7 +64,9 @@ class SpeechProgress:
         """
         self.check()
         if sync not in self.points:
-            raise ClientError(self.refused or f"the speech {self._id} has ended without a sync {sync!r}")
+            if self.last is not None:
+                self.end()
+            raise ClientError(f"the speech {self.block} has ended without a sync {sync!r}")
         return self.points[sync]
 
     def result(self) -> BlockProgress:
@@ -81,9 +76,7 @@ class SpeechProgress:
             ClientError: it was refused.
         """
         self.check()
-        if self.end is None:
-            raise ClientError(self.refused or f"the speech {self._id} has not ended")
-        return self.end
+        return self.end()
 
 
 class OpenSpeech(ABC):
@@ -148,6 +141,7 @@ class OpenSpeech(ABC):
         if earlier is not None and earlier.progress.is_finished:
             await earlier._end_stopped()
         opening, self._opening = self._opening or {}, None
+        self.progress.is_sent = True
         await self._control("speech", id=self.id, **opening, **fields)
 
     def _check_open(self) -> None:

@@ -162,6 +162,74 @@ def test_client_play_refuses_a_blank_text_at_once(nothing: str) -> None:
     serving(test)
 
 
+@pytest.mark.parametrize(
+    "document",
+    [
+        "<bml xmlns='http://www.bml-initiative.org/bml/bml-2.0' id='b'/>",
+        "<bml id='a:b'/>",
+        "<bml id='bml'/>",
+        f"<bml id='{'x' * 300}'/>",
+        "<bml id='b'/><bml id='c'",
+        "<bml id='b'/><bml id='b'/>",
+        f"<bml id='b'/><bml id='c'/>{' ' * (1 << 20)}",
+        ' {"type":"foo"}',
+    ],
+)
+def test_client_play_raises_for_every_refused_document(document: str) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ClientError) as caught:
+                await client.play(document)
+            assert caught.value.code == "refused"
+
+    serving(test)
+
+
+@pytest.mark.parametrize(
+    ("document", "block"),
+    [
+        ("<bml><head type='NOD'/></bml>", "unnamed1"),
+        ("<act><participant id='x'/><bml><head type='NOD'/></bml></act>", "unnamed1"),
+        ("<bml id=' b '/>", "b"),
+        ("<bml id='b'><bml id='c'/></bml>", "b"),
+        ("<bml id='b'><speech id='s'><text><![CDATA[<bml id='z'/>]]></text></speech></bml>", "b"),
+    ],
+)
+def test_client_play_follows_the_block_that_the_service_plays(document: str, block: str) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            assert (await client.play(document)).id == f"{block}:end"
+            await client.send(document.replace("'b'", "'b2'"))
+            assert [feedback async for feedback in client.until_end()][-1] == client._router.last_sent.last
+
+    serving(test)
+
+
+def test_client_play_of_an_id_in_use_leaves_the_older_block_alone() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            first, second = await asyncio.gather(
+                *(client.play(WAIT.format("b")) for _ in range(2)), return_exceptions=True
+            )
+            assert first.status == "DONE"
+            assert isinstance(second, ClientError)
+            assert "still in use" in str(second)
+
+    serving(test)
+
+
+def test_client_until_end_needs_something_to_wait_for() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ValueError, match="no BML was sent"):
+                await anext(client.until_end())
+            await client.send(WAIT.format("b"))
+            assert [f async for f in client.until_end()][-1].id == "b:end"
+            assert [f async for f in client.until_end()] == []
+
+    serving(test)
+
+
 def test_client_has_the_welcome_and_the_state() -> None:
     async def test(url: str) -> None:
         async with connect(f"{url}?session=show") as client:

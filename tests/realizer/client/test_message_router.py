@@ -8,15 +8,13 @@ import math
 import numpy as np
 import pytest
 
-from bml_schema.feedback import BlockPrediction, BlockProgress, PredictionFeedback, WarningFeedback
+from bml_schema.feedback import WarningFeedback
 from realizer.client.errors import ClientError
 from realizer.client.message_router import (
     MAX_FRAMES,
     MEMORY,
-    BlockWaiter,
     Playout,
     Router,
-    is_blank,
 )
 from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.streams import JSON_STREAMS, KINDS
@@ -59,6 +57,13 @@ def test_router_logs_an_error_without_a_request_once(mail, caplog) -> None:
     (record,) = caplog.records
     assert (record.name, record.levelname) == ("realizer.client", "WARNING")
     assert record.getMessage() == "type: wanted another"
+
+
+def test_router_logs_the_same_error_once(mail, caplog) -> None:
+    for where in ("speech.id", "speech.id", "set.aus"):
+        mail.receive(error(where))
+    assert [record.getMessage().partition(":")[0] for record in caplog.records] == ["speech.id", "set.aus"]
+    assert len(mail.errors) == 3
 
 
 def test_router_tells_an_unknown_type_from_that_of_the_request(mail) -> None:
@@ -120,54 +125,6 @@ def test_router_treats_an_answer_with_values_as_an_answer(mail) -> None:
     mail.receive('{"type":"state","values":[0.5]}')
     assert mail.answer()["values"] == [0.5]
     assert not mail.frames
-
-
-def planned(status: str) -> PredictionFeedback:
-    """A prediction without an end, as it is while a block waits for the end of an open speech."""
-    return PredictionFeedback(blocks=(BlockPrediction(id="b", global_start=0.0, status=status),))
-
-
-def block(id: str, time: float) -> BlockProgress:
-    return BlockProgress(id=id, global_time=time)
-
-
-def warning(id: str) -> WarningFeedback:
-    return WarningFeedback(id=id, type="PARSING_FAILURE")
-
-
-@pytest.mark.parametrize(
-    ("messages", "last"),
-    [
-        ([block("b:start", 1.0), block("b:end", 2.0)], "b:end"),
-        ([block("a:end", 1.0), block("b:end", 2.0)], "b:end"),
-        ([planned("IN_PREP"), warning("b")], "b"),
-        ([planned("LURKING"), warning("b"), block("b:end", 3.0)], "b:end"),
-        ([warning("b:n"), block("b:start", 1.0)], None),
-    ],
-)
-def test_block_waiter_finishes_with_the_end_or_the_refusal(messages, last) -> None:
-    until = BlockWaiter("b")
-    for feedback in messages:
-        until.on_feedback(feedback)
-    assert (until.last.id if until.last else None) == last
-    assert until.is_finished == (last is not None)
-    if last == "b":
-        with pytest.raises(ClientError):
-            until.end()
-
-
-@pytest.mark.parametrize(
-    ("bml", "block"),
-    [
-        ('<bml id="a"/><bml id="b"/>', "b"),
-        ('<bml id="a"/><!-- <bml id="b"/> -->', "a"),
-        ('<bml id="a&amp;b"/>', "a&b"),
-        ("<bml/>", None),
-    ],
-)
-def test_router_finds_the_last_block_outside_comments(mail, bml, block) -> None:
-    mail.on_sent(bml)
-    assert mail.last_block == block
 
 
 FPS = 25.0
@@ -237,9 +194,3 @@ def test_playout_without_ahead_passes_frames_on() -> None:
         frame = WireFrame(1, number, number / FPS, np.array([number], "<i4").tobytes())
         playout.receive(frame, ZERO + number / FPS + late)
         assert taken(playout, ZERO + number / FPS + late) == [(number, number)]
-
-
-@pytest.mark.parametrize("bml", [3, b"<bml/>", None])
-def test_is_blank_refuses_what_is_no_text(bml: object) -> None:
-    with pytest.raises(TypeError, match="bml: wanted a string, got"):
-        is_blank(bml)  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ import pytest
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress, WarningFeedback
 from realizer.client import ClientError, connect
+from realizer.client.block_waiters import BlockWaiters
 from realizer.client.speech import Speech, SpeechProgress
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
@@ -260,9 +261,30 @@ def test_speech_appends_a_text_of_any_length() -> None:
 
 def test_speech_progress_ignores_feedback_of_other_blocks() -> None:
     heard = SpeechProgress("s")
+    waiters = BlockWaiters(heard)
     for id in ("t.1:t:m", "s.1:n:m", "s:s:m", "s.1:s:stroke:2"):
-        heard.on_feedback(SyncPointProgress(id=id, time=0.0, global_time=1.0))
-    heard.on_feedback(BlockProgress(id="s.1:end", global_time=1.0))
-    heard.on_feedback(WarningFeedback(id="s.1", type="X", text="no"))
+        waiters.on_feedback(SyncPointProgress(id=id, time=0.0, global_time=1.0))
+    waiters.on_feedback(BlockProgress(id="s.1:end", global_time=1.0))
+    waiters.on_feedback(WarningFeedback(id="s.1", type="X", text="no"))
     assert heard.points == {"stroke:2": 1.0}
     assert not heard.is_finished
+
+
+def test_speech_with_the_id_of_one_being_spoken_leaves_that_alone() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            unused = client.speech("turn")
+            async with client.speech("turn") as first:
+                await first.append("One two three four.")
+            async with client.speech("turn") as second:
+                await second.append("Five.")
+            with pytest.raises(ClientError, match="'turn' is closed and being spoken"):
+                await second.ended()
+            with pytest.raises(ClientError, match="still in use"):
+                await client.play('<bml id="turn"><wait id="w" duration="0.1"/></bml>')
+            assert (await first.ended()).status == "DONE"
+            async with unused:
+                await unused.append("Six.")
+            assert (await unused.ended()).global_time > (await first.ended()).global_time
+
+    serving(test)
