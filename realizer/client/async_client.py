@@ -21,6 +21,7 @@ from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOp
 from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
+from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
 
@@ -243,12 +244,21 @@ class Client:
                 if feedback is waiter.last:
                     return
 
-    async def frames(self, stream: str) -> AsyncIterator[Frame]:
+    def frames(self, stream: str) -> AsyncIterator[Frame]:
         """Yield frames of a stream as they arrive: WireFrame, or a dictionary if the encoding is JSON.
 
         The attribute `stream_info` of a WireFrame describes its stream at that time. It changes when the
         character of a mesh gets another face, and `vertices` depends on it.
+
+        Raises:
+            ValueError: there is no such stream.
         """
+        names = [name for name in STREAMS if name != "feedback"]
+        if stream not in names:
+            raise ValueError(f"stream: wanted one of {', '.join(names)}; got {stream!r}")
+        return self._frames(stream)
+
+    async def _frames(self, stream: str) -> AsyncIterator[Frame]:
         queue = self._router.queue_of(stream)
         with contextlib.suppress(ClientError):
             while True:

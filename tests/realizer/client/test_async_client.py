@@ -66,6 +66,15 @@ def test_client_schedules_do_not_mix_with_answers() -> None:
     serving(test)
 
 
+def test_client_has_no_frames_of_an_unknown_stream() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            with pytest.raises(ValueError, match=r"wanted one of fap, au, .*; got 'fapp'"):
+                client.frames("fapp")
+
+    serving(test)
+
+
 def test_client_keeps_the_frames_of_two_streams_apart() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
