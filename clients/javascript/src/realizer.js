@@ -2,14 +2,19 @@ import { ANSWERS, JSON_STREAMS, RealizerError, frameOf, jsonFrameOf } from "./fr
 import { WebSocket, parseXml } from "#platform";
 import { Playout } from "./playout.js";
 import { Voice, rateOf, samplesOf, timed } from "./voice.js";
+import { Waiters, blocksOf } from "./waiters.js";
 
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
-const BLOCK = /<(?:\w+:)?bml\b[^<>]*?\sid\s*=\s*["']([^"'<>]+)["']/g;
-const COMMENT = /<!--[^]*?-->|<\?[^]*?\?>/g;
 const nothing = () => {};
 const over = () => new RealizerError("the connection was closed");
+/** Return a rejected promise that need not be handled. */
+const rejected = (error) => {
+  const promise = Promise.reject(error);
+  promise.catch(nothing);
+  return promise;
+};
 const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
 
 /**
@@ -39,7 +44,7 @@ export class Realizer {
   // stream, character and view -> { message, take, streamInfo: fields of `subscribed`, playout: with `ahead` }
   #streams = new Map();
   #unsent = []; // documents to send once the connection is open
-  #awaited = new Map(); // block id -> [{ planned, interrupted, resolve, reject }]
+  #waiters = new Waiters();
 
   /**
    * @param {object} [options]
@@ -95,7 +100,7 @@ export class Realizer {
     socket.onerror = nothing; // `onclose` follows
     socket.onclose = ({ reason }) => {
       // What comes later waits for the next connection, and is not interrupted.
-      if (wasOpen) for (const one of this.#waiting()) one.interrupted = true;
+      if (wasOpen) this.#waiters.interrupt();
       reject(new RealizerError(`no connection to ${this.url}${reason ? `: ${reason}` : ""}`));
       if (this.#closed) return;
       this.onlost();
@@ -107,10 +112,10 @@ export class Realizer {
   close() {
     this.#closed = true;
     this.socket?.close();
-    for (const { reject } of [...this.#asked, ...this.#waiting()]) reject(over());
+    for (const { reject } of this.#asked) reject(over());
+    this.#waiters.abandon(over);
     this.#asked = [];
     this.#unsent = [];
-    this.#awaited.clear();
   }
 
   /** Send BML, one or more documents. It is lost if the connection is not open. */
@@ -195,17 +200,20 @@ export class Realizer {
   }
 
   /**
-   * Send BML as soon as the connection is open, and wait for the end of its last block.
+   * Send BML as soon as the connection is open, and wait for the end of its last block. Feedback names blocks by their ids
+   * only: if another connection of the session sends the same id at the same time, this may be the end of its block.
    * @returns {Promise<Element>} the feedback of the end; rejects if the block is refused
    */
   play(text) {
-    const bare = text.replace(COMMENT, "");
-    // The service answers every text except an empty one.
-    if (!bare.trim()) return Promise.reject(new RealizerError("wanted <bml>, got nothing", "refused"));
-    const ids = [...bare.matchAll(BLOCK)];
-    const end = this.ended(ids.length ? ids.at(-1)[1] : "<no id>");
+    const isControl = /^[\s\ufeff]*\{/.test(text);
+    const blocks = isControl ? [] : blocksOf(text);
+    // The service answers every other text.
+    const got = isControl ? "a control message, which `ask` sends" : "nothing";
+    if (!blocks.length) return rejected(new RealizerError(`wanted <bml>, got ${got}`, "refused"));
+    if (this.#closed) return rejected(over());
+    const ends = blocks.map((block) => this.#waiters.add({ ...block, isSent: true, message: blocks }));
     this.#later(text);
-    return end;
+    return ends.at(-1);
   }
 
   /** Send a message as soon as the connection is open. */
@@ -255,17 +263,16 @@ export class Realizer {
   }
 
   #voice(rate, { id = `say-${crypto.getRandomValues(new Uint32Array(1))}`, ...opening }) {
-    return new Voice(id, rate, opening, (message) => this.#later(message), this.ended(id));
+    return new Voice(id, rate, opening, (message) => this.#later(message), this.#ended(id, true));
   }
 
-  /** Wait for the end of a block that was sent. */
+  /** Wait for the end of a block that was sent. An id that nobody sends is waited for until the connection is closed. */
   ended(id) {
-    const end = new Promise((resolve, reject) => {
-      if (this.#closed) return reject(over());
-      this.#awaited.set(id, [...(this.#awaited.get(id) ?? []), { planned: false, resolve, reject }]);
-    });
-    end.catch(nothing);
-    return end;
+    return this.#ended(id);
+  }
+
+  #ended(id, isSpeech = false) {
+    return this.#closed ? rejected(over()) : this.#waiters.add({ ids: [id], isSpeech, isSent: isSpeech });
   }
 
   #post(message) {
@@ -291,16 +298,8 @@ export class Realizer {
   #gap({ seen, first }) {
     this.seen = null;
     if (seen < first) return;
-    for (const [id, all] of this.#awaited) {
-      for (const one of all.filter(({ interrupted }) => interrupted)) {
-        one.reject(new RealizerError(`${id}: the session has ended; this is another one of its name`, "gap", id));
-      }
-      this.#awaited.set(id, all.filter(({ interrupted }) => !interrupted));
-    }
-  }
-
-  #waiting() {
-    return [...this.#awaited.values()].flat();
+    const other = (id) => new RealizerError(`${id}: the session has ended; this is another one of its name`, "gap", id);
+    this.#waiters.abandon(other, { interrupted: true });
   }
 
   #frame(frame) {
@@ -333,8 +332,7 @@ export class Realizer {
   /** Reject what waits for a speech whose message or clip (named SPEECH-NUMBER) the service has refused. */
   #refuse({ id, where, code, message }) {
     const speech = id ?? where.replace(/^clip:|-\d+$/g, "");
-    if (this.#awaited.has(speech)) this.send(JSON.stringify({ type: "speech", id: speech, close: true }));
-    this.#settle(speech, (one) => one.reject(new RealizerError(message, code, where)));
+    if (this.#waiters.fail(speech, new RealizerError(message, code, where))) this.#post({ type: "speech", id: speech, close: true });
   }
 
   #feedback(text) {
@@ -344,19 +342,11 @@ export class Realizer {
     const id = element.getAttribute("id");
     if (element.localName === "predictionFeedback") {
       for (const block of Array.from(element.getElementsByTagName("bml"))) {
-        if (block.getAttributeNS(BMLA, "status") !== "IN_PREP") for (const one of this.#awaited.get(block.getAttribute("id")) ?? []) one.planned = true;
+        const isNew = block.getAttributeNS(BMLA, "status") === "IN_PREP";
+        this.#waiters[isNew ? "acknowledge" : "plan"](block.getAttribute("id"));
       }
-    } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
-      this.#settle(id.slice(0, -4), (one) => one.resolve(element));
-    } else if (element.localName === "warningFeedback" && this.#awaited.get(id)?.some((one) => !one.planned)) {
-      // A warning about the block itself refuses it, unless its prediction was already sent.
-      this.#settle(id, (one) => one.reject(new RealizerError(element.textContent, "refused", id)));
-    }
+    } else if (element.localName === "blockProgress" && id.endsWith(":end")) this.#waiters.end(id.slice(0, -4), element);
+    else if (element.localName === "warningFeedback") this.#waiters.refuse(id, element.textContent);
     this.onfeedback(element, seq);
-  }
-
-  #settle(id, how) {
-    for (const one of this.#awaited.get(id) ?? []) how(one);
-    this.#awaited.delete(id);
   }
 }

@@ -23,6 +23,52 @@ test("play rejects a block that is refused", async () => {
   await assert.rejects(realizer.play("<bml id='b'><nonsense"), RealizerError);
 });
 
+test("play rejects every document that is refused", async () => {
+  const documents = [
+    "<bml xmlns='http://www.bml-initiative.org/bml/bml-2.0' id='b'/>",
+    "<bml id='a:b'/>",
+    "<bml id='bml'/>",
+    `<bml id='${"x".repeat(300)}'/>`,
+    "<bml id='b'/><bml id='c'",
+    "<bml id='b'/><bml id='b'/>",
+    `<bml id='b'/><bml id='c'/>${" ".repeat(1 << 20)}`,
+    "hello",
+    ' {"type":"foo"}',
+    "<!-- later -->",
+  ];
+  for (const document of documents) await assert.rejects(realizer.play(document), { code: "refused" }, document.slice(0, 99));
+});
+
+test("play follows the block that the service plays", async () => {
+  const documents = {
+    "<bml><head type='NOD'/></bml>": /^unnamed\d+:end$/,
+    "<act><participant id='x'/><bml><head type='NOD'/></bml></act>": /^unnamed\d+:end$/,
+    "<bml id=' b '/>": /^b:end$/,
+    "<bml id='&#98;2'/>": /^b2:end$/,
+    "<bml id='b3'><bml id='c'/></bml>": /^b3:end$/,
+    "<bml id='b4'><speech id='s'><text><![CDATA[<bml id='z'/>]]></text></speech></bml>": /^b4:end$/,
+    "```xml\n<bml id='b5'/>\n```": /^b5:end$/,
+  };
+  for (const [document, id] of Object.entries(documents)) assert.match((await realizer.play(document)).getAttribute("id"), id);
+});
+
+test("play of an id in use leaves the older block alone", async () => {
+  const [first, second] = await Promise.allSettled([realizer.play(NOD("twice")), realizer.play(NOD("twice"))]);
+  assert.equal(first.value.getAttribute("id"), "twice:end");
+  assert.match(second.reason.message, /still in use/);
+});
+
+test("voice with the id of one that is being spoken leaves that alone", async () => {
+  const [first, second] = [0, 1].map(() => {
+    const voice = realizer.voice({ rate: RATE, id: "turn" });
+    voice.write(tone(0.5));
+    voice.close();
+    return voice.ended();
+  });
+  await assert.rejects(second, /closed and being spoken/);
+  assert.equal((await first).getAttribute("id"), "turn:end");
+});
+
 test("connect rejects without a service", async () => {
   const lost = new Realizer({ url: "ws://127.0.0.1:1/ws" });
   await assert.rejects(lost.connect(), { code: "connection" });
