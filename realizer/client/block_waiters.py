@@ -64,6 +64,10 @@ class BlockWaiter:
         # A warning about a block that was planned is about something that was dropped from it.
         return not (self.is_acknowledged if _IN_USE in warning.text else self.is_planned)
 
+    def continues(self, other: "BlockWaiter") -> bool:
+        """Return whether the messages of this speech continue another one, so that they end together."""
+        return False
+
     def on_sync_point(self, feedback: SyncPointProgress) -> None:
         """Handle a sync point of the speech that this block belongs to."""
 
@@ -128,15 +132,14 @@ class BlockWaiters:
         match feedback:
             case BlockProgress(id=id):
                 block, _, point = id.rpartition(":")
-                if (waiter := self._current(block)) is None:
-                    return
-                if point == "start":
-                    waiter.start = feedback.global_time
-                elif point == "end":
-                    waiter.last = feedback
+                for waiter in self._reached(block):
+                    if point == "start":
+                        waiter.start = feedback.global_time
+                    elif point == "end":
+                        waiter.last = feedback
             case SyncPointProgress(id=id):
                 block = id.partition(":")[0].rpartition(".")[0]  # speech s is spoken in blocks s.1, s.2 ...
-                if (waiter := self._current(block)) is not None:
+                for waiter in self._reached(block):
                     waiter.on_sync_point(feedback)
             case WarningFeedback():
                 self._refuse(feedback)
@@ -144,8 +147,8 @@ class BlockWaiters:
                 for prediction in blocks:
                     if prediction.status == "IN_PREP":
                         self._acknowledge(prediction.id)
-                    elif (waiter := self._current(prediction.id)) is not None:
-                        waiter.is_planned = waiter.is_acknowledged
+                    elif (current := self._current(prediction.id)) is not None:
+                        current.is_planned = current.is_acknowledged
         self._drop_finished()
 
     def on_error(self, error: dict[str, Any]) -> None:
@@ -162,9 +165,15 @@ class BlockWaiters:
         return [waiter for waiter in self._waiters if not waiter.is_finished]
 
     def _current(self, block: str) -> BlockWaiter | None:
-        """Return the waiter for the block of an id that plays or comes next."""
+        """Return the first waiter for the block of an id that plays or comes next."""
         found = [waiter for waiter in self._unfinished() if waiter.block == block]
         return min(found, key=lambda waiter: (not waiter.is_acknowledged, not waiter.is_sent), default=None)
+
+    def _reached(self, block: str) -> list[BlockWaiter]:
+        """Return the waiters for the block of an id that plays or comes next."""
+        if (current := self._current(block)) is None:
+            return []
+        return [current, *(waiter for waiter in self._unfinished() if waiter.continues(current))]
 
     def _acknowledge(self, id: str) -> None:
         waiting = [w for w in self._unfinished() if w.is_sent and not w.is_acknowledged]

@@ -24,15 +24,21 @@ class SpeechProgress(BlockWaiter):
     """A waiter for the syncs and the end of one speech.
 
     Attributes:
+        is_closed: whether its last message was sent.
         points: sync of the text -> when it was spoken, seconds on the session clock.
         fault: the error about its messages, or None: a closed speech of that id is still being spoken.
     """
 
     def __init__(self, id: str) -> None:
         super().__init__(id)
-        self.is_sent = False
+        self.is_sent = self.is_closed = False
         self.points: dict[str, float] = {}
         self.fault: dict[str, Any] | None = None
+
+    def continues(self, other: BlockWaiter) -> bool:
+        if not isinstance(other, SpeechProgress) or other is self or other.is_closed:
+            return False
+        return self.block == other.block and self.is_sent and not self.is_acknowledged
 
     def on_sync_point(self, feedback: SyncPointProgress) -> None:
         _, behaviour, sync = feedback.id.split(":", 2)
@@ -142,6 +148,7 @@ class OpenSpeech(ABC):
             await earlier._end_stopped()
         opening, self._opening = self._opening or {}, None
         self.progress.is_sent = True
+        self.progress.is_closed |= bool(fields.get("close"))
         await self._control("speech", id=self.id, **opening, **fields)
 
     def _check_open(self) -> None:

@@ -288,3 +288,16 @@ def test_speech_with_the_id_of_one_being_spoken_leaves_that_alone() -> None:
             assert (await unused.ended()).global_time > (await first.ended()).global_time
 
     serving(test)
+
+
+def test_speech_with_the_id_of_an_open_one_continues_that() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            first = client.speech("turn")
+            await first.append("One. ")
+            async with client.speech("turn") as second:
+                await second.append('Two <sync id="m"/>three.')
+            assert await second.until("m") > 0
+            assert await second.ended() == await first.ended()
+
+    serving(test)
