@@ -263,7 +263,9 @@ export class Realizer {
   }
 
   #voice(rate, { id = `say-${crypto.getRandomValues(new Uint32Array(1))}`, ...opening }) {
-    return new Voice(id, rate, opening, (message) => this.#later(message), this.#ended(id, true));
+    rateOf(rate); // before anything waits for the speech
+    const voice = new Voice(id, rate, opening, (message) => this.#later(message), this.#ended(id, () => voice));
+    return voice;
   }
 
   /** Wait for the end of a block that was sent. An id that nobody sends is waited for until the connection is closed. */
@@ -271,8 +273,8 @@ export class Realizer {
     return this.#ended(id);
   }
 
-  #ended(id, isSpeech = false) {
-    return this.#closed ? rejected(over()) : this.#waiters.add({ ids: [id], isSpeech, isSent: isSpeech });
+  #ended(id, speech = null) {
+    return this.#closed ? rejected(over()) : this.#waiters.add({ ids: [id], speech, isSent: Boolean(speech) });
   }
 
   #post(message) {

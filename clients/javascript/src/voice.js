@@ -8,6 +8,8 @@ const nothing = () => {};
 
 /** A speech that is sent as sound comes; `Realizer.voice` opens one. */
 export class Voice {
+  /** Whether its last message was sent. */
+  closing = false;
   #send; // sends text or bytes
   #opening; // fields of the first message
   #ended;
@@ -62,7 +64,7 @@ export class Voice {
   close() {
     if (this.#closed) return;
     if (this.#waiting) this.#flush(this.#waiting);
-    this.#closed = true;
+    this.#closed = this.closing = true;
     this.#speech({ close: true });
   }
 

@@ -78,12 +78,12 @@ export function blocksOf(text) {
 
 /** Those who wait for blocks, in the order in which these were sent: blocks of one id are answered in this order. */
 export class Waiters {
-  #all = []; // { ids, mayLackId, isSent, isSpeech, message, acknowledged, planned, interrupted, failed, resolve, reject }
+  #all = []; // { ids, mayLackId, isSent, speech, message, acknowledged, planned, interrupted, failed, resolve, reject }
 
   /**
    * Wait for a block.
-   * @param {object} block ids and mayLackId as in `blocksOf`; message: what was sent with it; isSpeech: errors may be
-   *   about it; isSent: whether this client sends it
+   * @param {object} block ids and mayLackId as in `blocksOf`; message: what was sent with it; speech: returns its
+   *   Voice; isSent: whether this client sends it
    * @returns {Promise<Element>} the feedback of its end
    */
   add(block) {
@@ -105,8 +105,13 @@ export class Waiters {
 
   end(id, element) {
     const one = this.#current(id);
-    one?.resolve(element);
-    this.#remove([one]);
+    if (!one) return;
+    // The messages of another speech that has its id continue one that is not closed.
+    const isShared = one.speech && !one.speech().closing;
+    const others = this.#waiting().filter(({ ids, speech, acknowledged }) => isShared && speech && ids[0] === id && !acknowledged);
+    const ended = [one, ...others];
+    for (const { resolve } of ended) resolve(element);
+    this.#remove(ended);
   }
 
   /** Reject the block that a warning refuses: not one that was planned, from which something was dropped. */
@@ -130,7 +135,7 @@ export class Waiters {
    */
   fail(id, error) {
     const own = this.#all.filter(({ ids }) => ids[0] === id);
-    const one = own.findLast(({ isSpeech }) => isSpeech) ?? own.at(-1);
+    const one = own.findLast(({ speech }) => speech) ?? own.at(-1);
     if (!one || one.failed) return false;
     one.failed = true; // each of its messages causes an error, which must not reach an older speech
     one.reject(error);

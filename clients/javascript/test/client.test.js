@@ -124,6 +124,8 @@ test("say rejects what is no sound and no word", async () => {
   await assert.rejects(realizer.say(Float32Array.from(tone(0.1)), { rate: RATE }), /from -1 to 1, got/);
   await assert.rejects(realizer.say(new Float32Array([0, NaN]), { rate: RATE }), /from -1 to 1, got NaN/);
   await assert.rejects(realizer.say(tone(0.1), { rate: 0.5 }), /rate: wanted samples a second/);
+  assert.throws(() => realizer.voice({ rate: 0.5, id: "rate" }), /rate: wanted samples a second/);
+  assert.equal((await realizer.play(NOD("rate"))).getAttribute("id"), "rate:end");
   await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: ["Hello"] }), /words\[0\]: wanted/);
   await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: [[-0.1, "h"]] }), /wanted seconds from 0 on, got/);
 });

@@ -87,11 +87,22 @@ test("a message that is refused as a whole ends all its blocks", async () => {
 
 test("errors of a refused speech do not reach an older one", async () => {
   const waiters = new Waiters();
-  const found = outcomes(waiters, ...[1, 2].map(() => ({ ids: ["s"], isSpeech: true })));
+  const found = outcomes(waiters, ...[1, 2].map(() => ({ ids: ["s"], speech: () => ({ closing: true }) })));
   waiters.acknowledge("s");
   assert.ok(waiters.fail("s", { code: "invalid" }));
   assert.ok(!waiters.fail("s", { code: "invalid" }));
   waiters.end("s", "end");
   await settled();
   assert.deepEqual(found, ["end", "invalid"]);
+});
+
+test("a speech continues an open one of its id, and ends with it", async () => {
+  for (const closing of [false, true]) {
+    const waiters = new Waiters();
+    const found = outcomes(waiters, ...[1, 2].map(() => ({ ids: ["s"], speech: () => ({ closing }) })));
+    waiters.acknowledge("s");
+    waiters.end("s", "end");
+    await settled();
+    assert.deepEqual(found, ["end", closing ? null : "end"]);
+  }
 });
