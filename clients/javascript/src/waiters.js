@@ -63,13 +63,13 @@ function startTags(text) {
  *   mayLackId: whether a warning without an id may be about it. None if there is no answer
  */
 export function blocksOf(text) {
-  const isWrapped = /<(?:act|fml-apml)[\s>]/.test(text);
+  const isOdd = /<(?:act|fml-apml)[\s>]|<!DOCTYPE/.test(text);
   const blocks = startTags(text).map(({ prefix, text }) => {
     const raw = attribute(text, "id");
     const id = raw === null ? null : unescape(raw).trim();
     const namespace = attribute(text, prefix ? `xmlns:${prefix}` : "xmlns") ?? CORE;
-    const isPlain = /^[^\s:&<]{1,256}$/.test(raw ?? "") && id !== "bml" && namespace === CORE && !isWrapped;
-    return { ids: id ? [id, raw] : [], mayLackId: !isPlain };
+    const isPlain = /^[^\s:&<]{1,256}$/.test(raw ?? "") && id !== "bml" && namespace === CORE && !isOdd;
+    return { ids: raw === null ? [] : [id, raw], mayLackId: !isPlain };
   });
   if (blocks.length > MAX_DOCUMENTS) return [...blocks.slice(0, MAX_DOCUMENTS), { ids: [NO_ID], mayLackId: true }];
   if (blocks.length || !text.replace(UNANSWERED, "")) return blocks;
@@ -94,7 +94,7 @@ export class Waiters {
 
   acknowledge(id) {
     const waiting = this.#waiting().filter((one) => !one.acknowledged);
-    const one = waiting.find(({ ids }) => ids[0] === id) ?? (MADE.test(id) ? waiting.find(({ ids }) => !ids.length) : null);
+    const one = waiting.find(({ ids }) => ids[0] === id) ?? (MADE.test(id) ? waiting.find(({ ids }) => !ids[0]) : null);
     if (one) Object.assign(one, { ids: [id], acknowledged: true });
   }
 
