@@ -223,7 +223,7 @@ class Client:
         """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent.
 
         Args:
-            block: an id; another client may send this block, also later: without it, this waits.
+            block: an id. Another client may send this block, also later: this waits until one ends.
 
         Raises:
             ValueError: nothing was sent, so that there is no last block.
