@@ -1,7 +1,5 @@
 """The example documents that ship with the package, in the order they are played."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 
 

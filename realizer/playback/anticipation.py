@@ -1,7 +1,5 @@
 """Anticipated points: times that clients announce, and how soon they can be for what is tied to them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from itertools import repeat
 from math import inf

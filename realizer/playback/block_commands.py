@@ -1,7 +1,5 @@
 """Commands of behaviours to other blocks: interrupt, activate, change a parameter."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

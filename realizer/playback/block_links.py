@@ -1,7 +1,5 @@
 """Links between a block and the active ones: dependencies, references, and what is solved together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
 from math import inf

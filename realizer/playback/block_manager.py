@@ -1,7 +1,5 @@
 """The manager of a session's blocks: it accepts, starts, moves and ends them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice

@@ -1,7 +1,5 @@
 """Steps 2 to 4 of the pipeline for one block: timings, schedule and channels."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn

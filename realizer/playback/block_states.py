@@ -1,7 +1,5 @@
 """The states of a block from its announcement to its end, and the table of the changes between them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from enum import StrEnum
 from types import MappingProxyType

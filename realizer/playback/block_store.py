@@ -1,7 +1,5 @@
 """The store of a session's blocks, and of the times of their sync points."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from math import inf

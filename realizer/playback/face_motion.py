@@ -1,7 +1,5 @@
 """The motion of a session's faces: of blocks, base states, direct values, speech and idle."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Events of blocks in the order of report, and the BML feedback about them."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Collection, Iterator, Mapping
 from enum import IntEnum, auto

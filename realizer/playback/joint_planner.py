@@ -1,7 +1,5 @@
 """The planner of blocks beside the active ones, which are solved together with those they are linked to."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf

@@ -1,7 +1,5 @@
 """The behaviours of a planned block on the session clock: channels, base states and speech."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain

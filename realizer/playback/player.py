@@ -3,8 +3,6 @@
 It has no clock and no I/O: every call has the argument `now`, seconds on the session clock.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The sync references of a block: collection and replacement."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Utterances on the session clock, and their samples, cut off and faded as heard."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Speech synthesis for blocks: before planning, and again if the plan needs other durations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The timeline of accepted blocks: placed, moved, rescheduled, cut off and stopped."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace

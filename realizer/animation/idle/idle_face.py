@@ -1,7 +1,5 @@
 """The idle animation of a face: blinks, motion of head and eyes, slow motion, as far as masks leave it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

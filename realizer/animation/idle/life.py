@@ -4,8 +4,6 @@ It is a function of (seed, time) alone, computed at fixed instants in batches, s
 agree where they overlap, and interpolated for frames.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The continuous motion of the head during speech, which follows the melody of the voice."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
