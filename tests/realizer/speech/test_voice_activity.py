@@ -49,7 +49,7 @@ def test_voice_activity_does_not_depend_on_the_pieces(cuts) -> None:
 
 
 @pytest.mark.parametrize(("louder", "heard"), [(2.4, False), (4.2, True)])
-def test_voice_activity_hears_a_voice_that_is_a_little_louder_than_the_room(louder, heard) -> None:
+def test_voice_activity_hears_a_voice_louder_than_the_room(louder, heard) -> None:
     found = turns(sound((3.0, 200), (1.0, 200 * louder), (1.5, 200)))
     assert bool(found) is heard
 

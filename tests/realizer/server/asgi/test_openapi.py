@@ -26,7 +26,7 @@ def test_description_tells_what_each_operation_answers() -> None:
             assert "default" in operation["responses"]
 
 
-def test_description_has_the_status_of_what_is_done_and_of_what_is_only_accepted() -> None:
+def test_description_has_the_status_of_what_is_done_or_accepted() -> None:
     paths = description()["paths"]
     for path in ("/realize", "/check"):
         assert set(paths[path]["post"]["responses"]) >= {"200"}
