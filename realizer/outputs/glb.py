@@ -1,6 +1,7 @@
 """The output .glb: an animated glTF 2.0 head with morph targets and joints, or somebody's own avatar."""
 
 from collections.abc import Mapping
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -102,8 +103,11 @@ def encode_avatar(realization: Realization, avatar: Avatar) -> bytes:
         _split(document["nodes"][node])
         keys.append((node, "rotation", _in_parent(turned[bone], avatar, node)))
     animation = file.animation("performance", clock, keys)
-    # A file of ours already has an animation of that name, which the new one replaces.
-    others = [a for a in document.get("animations", ()) if a.get("name") != animation["name"]]
+    # A file that was written here has an animation of that name: it gets a number.
+    others = list(document.get("animations", ()))
+    names = {other.get("name") for other in others}
+    free = next(name for k in count(2) if (name := f"{animation['name']} {k}") not in names)
+    others = [{**a, "name": free} if a.get("name") == animation["name"] else a for a in others]
     return file.bytes_of({**document, "animations": [animation, *others]})
 
 

@@ -71,12 +71,14 @@ def test_avatar_turns_its_eyes_in_the_head(played, shown):
     np.testing.assert_allclose(seen["frames"][-1]["leftEye"], turned(played, frame, at, head), atol=1e-5)
 
 
-def test_avatar_of_an_earlier_run_has_the_new_animation_alone(played, tmp_path):
+def test_avatar_of_an_earlier_run_has_animations_of_different_names(played, tmp_path):
     (tmp_path / "mine.glb").write_bytes(avatars.avatar())
     first = played.save(tmp_path / "first.glb", avatar=tmp_path / "mine.glb")
     again = played.save(tmp_path / "again.glb", avatar=first)
-    document, _ = read_glb(again.read_bytes())
-    assert [animation["name"] for animation in document["animations"]] == ["performance"]
+    third = played.save(tmp_path / "third.glb", avatar=again)
+    document, _ = read_glb(third.read_bytes())
+    names = [animation["name"] for animation in document["animations"]]
+    assert names == ["performance", "performance 3", "performance 2"], "the newest first"
 
 
 def test_avatar_of_vrm_0_looks_back(played, shown):
