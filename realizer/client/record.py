@@ -13,9 +13,7 @@ import numpy as np
 from bml_schema.feedback import BlockProgress
 from realizer.client.errors import ClientError
 from realizer.core.array_types import Int16, UInt8
-from realizer.core.atomic_files import replacing
 from realizer.core.units import frame_count
-from realizer.outputs.film import FORMATS, encode_film
 from realizer.protocol.wire import PictureFrame, SoundFrame
 
 RATE = 48_000  # Hz
@@ -27,6 +25,9 @@ async def record(
     connection: AbstractAsyncContextManager[Any], path: Path, bml: str, fps: float, look: Mapping[str, Any]
 ) -> BlockProgress:
     """Play BML and save its last block as a film. Other arguments and errors are those of `Client.film`."""
+    from realizer.core.atomic_files import replacing
+    from realizer.outputs.film import FORMATS, encode_film
+
     if path.suffix.lower() not in FORMATS:
         raise ClientError(f"wanted a film ({' or '.join(FORMATS)}), got {path.name}", "film")
     if not path.parent.is_dir():

@@ -16,7 +16,6 @@ from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
 from realizer.server.runtime.session_host import SessionHost, disable_automatic_gc
-from realizer.server.runtime.workers import FAULT, READY, Workers, receive_sockets
 from realizer.server.transports.transport import Transport, requested
 from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
@@ -39,6 +38,8 @@ async def serve(settings: Settings | None = None) -> None:
     if settings.log == "json":
         write_json()
     if settings.workers > 1:
+        from realizer.server.runtime.workers import Workers
+
         with _bind_errors(settings):
             workers = await Workers(settings, run_worker).start()
         ending = wait_for_signal(signal.SIGINT, signal.SIGTERM)
@@ -64,6 +65,8 @@ def _bind_errors(settings: Settings) -> Iterator[None]:
 
 async def work(settings: Settings, number: int, control: socket.socket) -> None:
     """Serve as a worker the connections that arrive through `control`, until SIGTERM or the parent's end."""
+    from realizer.server.runtime.workers import FAULT, READY, receive_sockets
+
     if settings.log == "json":
         write_json()
     loop = asyncio.get_running_loop()

@@ -4,6 +4,8 @@ The parent peeks at the first line of a request, which stays in the socket, and 
 that later messages go directly to the worker.
 """
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import itertools
@@ -14,7 +16,7 @@ import socket
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
-from typing import Any, Self
+from typing import Any
 from urllib.parse import parse_qs
 
 from realizer.core.errors import RealizerError
@@ -55,7 +57,7 @@ class Workers:
         self._turn = itertools.count()
         self._ending = False
 
-    async def start(self) -> Self:
+    async def start(self) -> Workers:
         """Start the workers, then open the port.
 
         Raises:

@@ -433,7 +433,7 @@ def test_serve_ends_its_workers_if_printing_fails(monkeypatch: pytest.MonkeyPatc
     def gone(*_: object, **__: object) -> None:
         raise BrokenPipeError
 
-    monkeypatch.setattr("realizer.server.serve.Workers", Workers)
+    monkeypatch.setattr("realizer.server.runtime.workers.Workers", Workers)
     monkeypatch.setattr("builtins.print", gone)
     settings = Settings(workers=2, port=0)
     with pytest.raises(BrokenPipeError):
