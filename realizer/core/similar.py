@@ -1,5 +1,7 @@
 """Similar names, for messages about unknown ones."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from difflib import get_close_matches
 

@@ -1,7 +1,9 @@
 """The message `speech`: text chunk by chunk, or annotations of a sound clip."""
 
+from __future__ import annotations
+
 import re
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 from pydantic import AliasChoices, Field, field_validator, model_validator
 
@@ -75,7 +77,7 @@ class SpeechMessage(Message):
         return bool(self.text is not None or self.words or self.phonemes or self.visemes)
 
     @model_validator(mode="after")
-    def _whole(self) -> Self:
+    def _whole(self) -> SpeechMessage:
         if self.id is None and self.clip is None:
             raise ValueError("wanted the id of a speech, or a clip")
         if self.id is None and (self.append is not None or self.close):

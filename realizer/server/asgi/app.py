@@ -1,5 +1,7 @@
 """The application: pages and tools as `realizer serve` has them, sessions by WebSocket and by HTTP, files."""
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import json
@@ -17,7 +19,6 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket
 
-from realizer.checking.source import check
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.asgi.client import AsgiClient
@@ -125,6 +126,8 @@ async def _realize(hub: Hub, request: Request) -> Response:
 
 
 async def _check(hub: Hub, request: Request) -> Response:
+    from realizer.checking.source import check
+
     hub.admit(request)
     body = await hub.body(request, MAX_TEXT)
     loop = asyncio.get_running_loop()

@@ -1,27 +1,23 @@
 """Requests of the designer: each is a JSON object with the name of a tool, answered by JSON."""
 
+from __future__ import annotations
+
 import json
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
-from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from realizer.checking.timeline_advice import missing_companions, timeline_advice
 from realizer.core.errors import RealizerError, TableError
 from realizer.core.settings import Settings
 from realizer.expressions.expression import Expression
 from realizer.expressions.library import library_of
-from realizer.expressions.search import by_action_units, by_meaning
-from realizer.expressions.timeline import Timeline, duration_of, faults_of, remarks, spans, visible_spans
+from realizer.expressions.timeline import Timeline, faults_of
 from realizer.expressions.timeline_file import MAX_SECONDS, read_timeline
-from realizer.outputs.wav import RATE
-from realizer.server.design.documents import enrich_text, export, open_file, sound
-from realizer.server.design.frames import expression_frame, timeline_frames
-from realizer.server.edits.edit_folder import version_of
-from realizer.tables.knowledge import Mood, Role, knowledge
-from realizer.tables.lexemes import read_aus
+
+if TYPE_CHECKING:
+    from realizer.tables.knowledge import Mood, Role
 
 MAX_REQUEST = 1_000_000  # characters
 
@@ -59,6 +55,10 @@ def timeline_of(request: Mapping[str, Any], settings: Settings) -> Timeline:
 
 def _library(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     """Return the expressions, all or those that match `find`: words, or action units such as "1+2+12L"."""
+    from realizer.expressions.search import by_action_units, by_meaning
+    from realizer.tables.knowledge import knowledge
+    from realizer.tables.lexemes import read_aus
+
     library = library_of(settings.library_folder)
     known = list(library.values())
     query = str(request.get("find", "")).strip()
@@ -79,12 +79,19 @@ def _row(expression: Expression) -> dict[str, Any]:
     row |= {name: row[name]["seconds"] for name in ("onset", "apex", "offset")}
     row |= {"file": None if file is None else file.stem, "units": expression.units}
     if file is not None:
+        from realizer.server.edits.edit_folder import version_of
+
         row |= {"source": expression.source, "version": version_of(file.read_bytes())}
     return row
 
 
 def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     """Return what is unusual about a timeline, the expressions it lacks, and its duration."""
+    from itertools import islice
+
+    from realizer.checking.timeline_advice import missing_companions, timeline_advice
+    from realizer.expressions.timeline import duration_of, remarks, spans, visible_spans
+
     library = library_of(settings.library_folder)
     timeline = _distinct(timeline_of(request, settings))
     places = {span.place: (span.track, span.entry) for span in visible_spans(timeline, library)}
@@ -123,31 +130,44 @@ def _distinct(timeline: Timeline) -> Timeline:
 
 def mood_of(request: Mapping[str, Any]) -> Mood | None:
     """Return the mood that a request names; raises KeyError."""
+    from realizer.tables.knowledge import knowledge
+
     return knowledge().mood(str(request["mood"])) if request.get("mood") else None
 
 
 def _frames(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.frames import expression_frame, timeline_frames
+
     if "aus" in request:
         return expression_frame(request, settings)
     return timeline_frames(request, timeline_of(request, settings), settings)
 
 
 def _open(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import open_file
+
     return asdict(open_file(str(request.get("text", "")), settings))
 
 
 def _enrich(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import enrich_text
+
     listener = request.get("role") == "listener"
     return asdict(enrich_text(str(request.get("text", "")), settings, mood_of(request), listener=listener))
 
 
 def _export(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    from realizer.server.design.documents import export
+
     timeline = timeline_of(request, settings)
     return {"text": export(timeline, str(request.get("form")), settings, _says(request))}
 
 
 def _sound(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
     """Return what is said as int16 in base64, and its rate in Hz."""
+    from realizer.outputs.wav import RATE
+    from realizer.server.design.documents import sound
+
     heard = sound(_says(request), settings).astype("<i2").tobytes()
     return {"rate": RATE, "data": b64encode(heard).decode()}
 

@@ -1,19 +1,23 @@
 """The folder in which clients save files: which kinds, whole, and never over somebody else's change."""
 
+from __future__ import annotations
+
 import base64
 import binascii
 import hashlib
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from realizer.core.atomic_files import lock, write_bytes
 from realizer.core.errors import RealizerError
-from realizer.expressions.user_expressions import check_file
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage, Saved
-from realizer.server.session.effects import Write
+
+if TYPE_CHECKING:
+    from realizer.server.session.effects import Write
+
 
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}")
 LOCK = ".lock"
@@ -122,4 +126,10 @@ def _content(text: str, encoding: str) -> bytes:
         raise EditError("content: wanted base64") from None
 
 
-KINDS = {"expression": Kind("expressions", ".toml", check_file)}
+def _check_expression(path: Path, content: bytes) -> None:
+    from realizer.expressions.user_expressions import check_file
+
+    check_file(path, content)
+
+
+KINDS = {"expression": Kind("expressions", ".toml", _check_expression)}

@@ -1,5 +1,7 @@
 """The answers to the tab Label: recordings of a corpus, their films, and the labels that people save."""
 
+from __future__ import annotations
+
 import json
 import mimetypes
 from collections.abc import Iterable

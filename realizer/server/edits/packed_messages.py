@@ -1,5 +1,7 @@
 """Messages of a page and its tools: JSON, or JSON with arrays or bytes behind it."""
 
+from __future__ import annotations
+
 import json
 import struct
 from collections.abc import Mapping

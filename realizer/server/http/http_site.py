@@ -17,16 +17,6 @@ import numpy as np
 
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.examples import examples
-from realizer.expressions.library import library_of
-from realizer.face.load import face_folders, face_name, load_face
-from realizer.render.backdrop import is_picture
-from realizer.render.cameras import camera_for
-from realizer.render.lamp_view import LampView
-from realizer.render.light import HEIGHT, preset, presets
-from realizer.render.surfaces import mirrored_of, uniforms_of
-from realizer.server.design.frames import sheet
-from realizer.server.http.face_glb import face_glb
 from realizer.server.http.page_tools import ToolError, UnknownName, export_pose, preview_emotion
 from realizer.server.http.vocabulary import vocabulary
 
@@ -138,6 +128,8 @@ class HttpSite:
         return _json(_look(face, self._settings.light, self._settings.background))
 
     def _background(self, asked: dict[str, str]) -> HttpResponse:
+        from realizer.render.backdrop import is_picture
+
         path = self._settings.background
         if path is None or not is_picture(path):
             return self._file("background")
@@ -169,6 +161,8 @@ class HttpSite:
 
     def _expressions(self, asked: dict[str, str]) -> HttpResponse:
         """Return pictures of the library, or 202 while they are drawn, which takes seconds."""
+        from realizer.expressions.library import library_of
+
         edition = library_of(self._settings.library_folder).edition
         try:
             drawn = _sheet(_face(asked.get("face", "default")), self._settings, edition).result(PATIENCE)
@@ -204,6 +198,8 @@ def _json(text: str | bytes) -> HttpResponse:
 
 def _face(name: str) -> str:
     """Return the name of a face in a URL if there is such a face, without a look at other folders."""
+    from realizer.face.load import face_folders, face_name
+
     known = face_folders()
     if not NAME.fullmatch(name) or face_name(name) not in known:
         raise UnknownName(f"face: wanted one of {', '.join(known)}, got {name[:80]!r}")
@@ -217,6 +213,8 @@ def asyncapi() -> bytes:
 
 @functools.cache
 def _examples() -> bytes:
+    from realizer.examples import examples
+
     rows = [
         {"name": name, "title": name.replace("-", " ").capitalize(), "bml": text}
         for name, text in examples().items()
@@ -227,6 +225,13 @@ def _examples() -> bytes:
 @functools.lru_cache(8)
 def _look(name: str, light: str | None, background: str | None) -> bytes:
     """Return the lights, as uniforms of `surface.glsl`, the camera and the backdrops of a face's pictures."""
+    from realizer.face.load import load_face
+    from realizer.render.backdrop import is_picture
+    from realizer.render.cameras import camera_for
+    from realizer.render.lamp_view import LampView
+    from realizer.render.light import HEIGHT, preset, presets
+    from realizer.render.surfaces import uniforms_of
+
     face = load_face(name)
     lights = {}
     for each in presets().values():
@@ -251,6 +256,9 @@ def _look(name: str, light: str | None, background: str | None) -> bytes:
 @functools.lru_cache(8)
 def _mirror(light: str) -> bytes:
     """Return the texels of `mirrorMap` of surface.glsl: half floats, red, green, blue and 1."""
+    from realizer.render.light import preset, presets
+    from realizer.render.surfaces import mirrored_of
+
     if light not in presets():
         raise UnknownName(f"light: wanted one of {', '.join(presets())}, got {light[:80]!r}")
     levels = mirrored_of(preset(light))
@@ -259,10 +267,15 @@ def _mirror(light: str) -> bytes:
 
 @functools.lru_cache(8)
 def _sheet(face: str, settings: Settings, edition: int) -> Future[bytes]:
+    from realizer.server.design.frames import sheet
+
     return _drawing.submit(sheet, face, settings)
 
 
 @functools.lru_cache(8)
 def _glb(name: str) -> tuple[bytes, str]:
+    from realizer.face.load import load_face
+    from realizer.server.http.face_glb import face_glb
+
     glb = face_glb(load_face(name))
     return glb, f'"{hashlib.sha256(glb).hexdigest()[:32]}"'

@@ -1,25 +1,17 @@
 """Tools of the page: checks of a text, emotion previews, pose export."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import replace
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from bml_schema import Emotion
-from realizer.animation.fap.conversion import to_fap
-from realizer.animation.fap.fap_clip import FAPClip
-from realizer.behaviours import emotion
-from realizer.behaviours.kind import PlanningContext
-from realizer.checking.finding import Finding
-from realizer.checking.source import findings_of
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
-from realizer.emotions.wheel import blend_weights
-from realizer.outputs.fap_text import encode
-from realizer.playback.player import Player
-from realizer.server.session.session import Session
+
+if TYPE_CHECKING:
+    from realizer.checking.finding import Finding
 
 MAX_TEXT = 50_000  # characters; checking takes a tenth of a second
 MAX_FINDINGS = 100
@@ -47,6 +39,9 @@ def lint(text: str, settings: Settings) -> str:
     A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is the place
     of the fault. Faults are those of `realizer check`; advice has the type "ADVICE".
     """
+    from realizer.checking.source import findings_of
+    from realizer.playback.player import Player
+
     if len(text) > MAX_TEXT:
         words = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
         return json.dumps({"faults": [], "skipped": words})
@@ -80,6 +75,11 @@ def preview_emotion(request: str) -> str:
     Raises:
         ToolError: the request is not an emotion.
     """
+    from bml_schema import Emotion
+    from realizer.behaviours import emotion
+    from realizer.behaviours.kind import PlanningContext
+    from realizer.emotions.wheel import blend_weights
+
     fields = {k: v for k, v in _object(request).items() if k in EMOTION and v is not None}
     if wrong := [name for name, value in fields.items() if not isinstance(value, EMOTION[name])]:
         raise ToolError(f"feeling: {wrong[0]}: wanted a {'text' if EMOTION[wrong[0]] is str else 'number'}")
@@ -109,6 +109,13 @@ def export_pose(message: str, face: str | None, settings: Settings) -> str:
     Raises:
         ToolError: the message is not a `set` message, or there is no such face.
     """
+    import numpy as np
+
+    from realizer.animation.fap.conversion import to_fap
+    from realizer.animation.fap.fap_clip import FAPClip
+    from realizer.outputs.fap_text import encode
+    from realizer.server.session.session import Session
+
     if _object(message).get("type") != "set":
         raise ToolError("wanted a message of the type set")
     # A session handles the message, so that the file has what the page shows, without idle motion.

@@ -5,19 +5,17 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from bml_schema import BMLA, BMLT, CORE, EXTENSIONS, OWN, Block, Constraint, Required
+from bml_schema import CORE, EXTENSIONS, Block, Constraint, Required
 from bml_schema.node_schema import local, schema_of
-from realizer.animation.axis import AU_NAMES
 from realizer.behaviours.registry import VOCABULARY
-from realizer.emotions.archetypes import archetypes
-from realizer.emotions.words import known_words
-from realizer.expressions.library import builtin
-from realizer.speech.registry import voices
-from realizer.tables import action_units, faps, regions
-from realizer.tables.emotions import ring
-from realizer.tables.lexemes import face_lexemes, head_lexemes
 
-PREFIXES = {CORE: "", EXTENSIONS: "", BMLA: "bmla", BMLT: "bmlt", OWN: "realizer"}
+PREFIXES = {
+    CORE: "",
+    EXTENSIONS: "",
+    "http://www.asap-project.org/bmla": "bmla",
+    "http://hmi.ewi.utwente.nl/bmlt": "bmlt",
+    "urn:bml-realizer:1": "realizer",
+}
 # Elements without a schema: the parser reads constraints itself.
 RELATIONS = ("synchronize", "before", "after")
 
@@ -30,6 +28,15 @@ def vocabulary() -> bytes:
     values: {"element attribute": words} for words that are looked up in a table.
     aus, faps, groups: for the sliders. wheel: points, in degrees and 0..7. profiles: {set: names}.
     """
+    from realizer.animation.axis import AU_NAMES
+    from realizer.emotions.archetypes import archetypes
+    from realizer.emotions.words import known_words
+    from realizer.expressions.library import builtin
+    from realizer.speech.registry import voices
+    from realizer.tables import action_units, faps, regions
+    from realizer.tables.emotions import ring
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+
     known, words = AU_NAMES(), sorted(known_words())
     aus = [
         {"au": row.au, "name": row.name, "sides": f"{row.au}L" in known}

@@ -19,7 +19,6 @@ from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import FeedbackLog
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.speech.clip import Clip
-from realizer.speech.voice_activity import VoiceActivity
 
 VERSION = 1
 STATE, CLIP = "state", "clip:"
@@ -143,6 +142,8 @@ def character_from_json(data: Mapping[str, Any]) -> Character:
     # Journals of 0.1 have no responses and hear no sound.
     responses = [_channel_from_json(channel) for channel in data.get("responses", ())]
     if (heard := data.get("heard")) is not None:
+        from realizer.speech.voice_activity import VoiceActivity
+
         heard = VoiceActivity(**{**heard, "rest": np.array(heard["rest"], np.int16)})
     return Character(data["id"], shifts, direct, emotion, responses, heard)
 

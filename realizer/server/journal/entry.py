@@ -1,10 +1,12 @@
 """Journal entries, saved sessions and the protocols of journals and recorders."""
 
+from __future__ import annotations
+
 import base64
 import json
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol, Self, get_args
+from typing import Any, Literal, Protocol, get_args
 
 from realizer.core.errors import RealizerError
 
@@ -50,7 +52,7 @@ class Entry:
         return json.dumps(data, ensure_ascii=False)
 
     @classmethod
-    def read(cls, line: str) -> Self:
+    def read(cls, line: str) -> Entry:
         """Parse a line that `line` returned.
 
         Raises:
@@ -90,7 +92,7 @@ class SavedSession:
         parts: Mapping[str, str],
         head: Mapping[str, Any] | None = None,
         place: str = "the journal:",
-    ) -> Self:
+    ) -> SavedSession:
         """Parse the stored lines of a session.
 
         Args:

@@ -4,7 +4,6 @@ import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Self
 
 from bml_schema import Block
 from realizer.core.errors import RealizerError, VoiceError
@@ -32,7 +31,7 @@ class ReplayNote:
         return json.dumps({"entry": self.entry, "begun": self.begun})
 
     @classmethod
-    def read(cls, parts: Mapping[str, str]) -> Self | None:
+    def read(cls, parts: Mapping[str, str]) -> "ReplayNote | None":
         """Return the note in the parts of a journal, or None."""
         try:
             data = json.loads(parts[NOTE])

@@ -1,11 +1,16 @@
 """The journal of a session: its entries, and checkpoints of its state."""
 
+from __future__ import annotations
+
 import logging
 from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
 
 from realizer.server.journal.checkpoint import Checkpoint
 from realizer.server.journal.entry import Entry, Journal, JournalError, Kind, SavedSession, TakenOver
-from realizer.server.journal.recordings import RecordingFolder
+
+if TYPE_CHECKING:
+    from realizer.server.journal.recordings import RecordingFolder
 
 log = logging.getLogger(__name__)
 

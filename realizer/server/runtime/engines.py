@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
 from realizer.core.work import FairPool
-from realizer.render.renderer import Renderer
 from realizer.server.session.effects import Draw, Look, RenderOptions, Speak
 from realizer.speech.duration_fit import speak_to_length
-from realizer.speech.registry import find_voice
 from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
+    from realizer.render.renderer import Renderer
     from realizer.tracking.mirror import Sight
 
 # Each combination of face, size, camera, light and background has a renderer, which is a process.
@@ -103,6 +102,8 @@ class Engines:
             slot.renderer.close()
 
     def _voice(self, name: str | None) -> Voice:
+        from realizer.speech.registry import find_voice
+
         with self._lock:
             if name not in self._voices:
                 self._voices[name] = find_voice(name)
@@ -115,6 +116,8 @@ class Engines:
         Raises:
             RenderError: too many others are in use.
         """
+        from realizer.render.renderer import Renderer
+
         options = replace(order.options, quality=0, form="jpeg")  # these need no process of their own
         key, removed = (order.face, options), None
         with self._lock:

@@ -1,5 +1,7 @@
 """The factory of sessions: new ones, and those restored from a journal, which other processes had."""
 
+from __future__ import annotations
+
 import asyncio
 import contextlib
 import functools
@@ -8,30 +10,31 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from itertools import islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
 from bml_schema import Emotion
-from realizer.behaviours.gaze_targets import parse_scene
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.face.fap_mapping import mapping_of
-from realizer.face.load import load_face
 from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
-from realizer.server.journal.recordings import RecordingFolder, recording_head
-from realizer.server.journal.replay import TRIES, ReplayNote, ReplayWatch, catch_up, restore_session
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.query_handlers import capabilities_of
 from realizer.server.session.session import Session
 from realizer.server.streams.broadcast import Overload
 from realizer.speech.utterance import Utterance
+
+if TYPE_CHECKING:
+    from realizer.server.journal.recordings import RecordingFolder
+    from realizer.server.journal.replay import ReplayNote, ReplayWatch
+
 
 log = logging.getLogger(__name__)
 
@@ -60,10 +63,16 @@ class SessionFactory:
         if settings.journal is not None:
             self.journal = journal_at(settings.journal)
         if settings.scene is not None:
+            from realizer.behaviours.gaze_targets import parse_scene
+
             self._scene = parse_scene(settings.scene.read_text("utf-8"))
         if settings.record is not None:
+            from realizer.server.journal.recordings import RecordingFolder, recording_head
+
             self._recorder = RecordingFolder(settings.record, recording_head(settings, self._scene))
         # Load the face now: a missing one is an error before any transport opens.
+        from realizer.face.load import load_face
+
         await loop.run_in_executor(None, lambda: load_face(settings.face, deformer=settings.deformer))
         # Emotions take half a frame to import: too long for the event loop.
         await loop.run_in_executor(None, KINDS.__getitem__, Emotion.tag)
@@ -111,6 +120,8 @@ class SessionFactory:
         """
         if self.journal is None or (saved := self.journal.claim(name)) is None:
             return None
+        from realizer.server.journal.replay import TRIES, ReplayNote, ReplayWatch, catch_up, restore_session
+
         loop = asyncio.get_running_loop()
         last = ReplayNote.read(saved.parts)
         parts = {part: text for part, text in saved.parts.items() if part != NOTE}

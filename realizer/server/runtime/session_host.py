@@ -9,7 +9,6 @@ from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
-from realizer.server.journal.replay import catch_up
 from realizer.server.runtime.session_factory import SessionFactory
 from realizer.server.runtime.session_registry import ANYBODY, Visitor, worker_of
 from realizer.server.runtime.session_runner import SessionRunner
@@ -185,6 +184,8 @@ class SessionHost(SessionRunner):
             del self._restoring[name]
 
     def _catch_up(self, session: Session, seen: int) -> None:
+        from realizer.server.journal.replay import catch_up
+
         now = self._loop.time()
         session.clock.opened -= catch_up(session, now, seen) - now
 

@@ -1,13 +1,17 @@
 """The faces assigned to the characters of a session."""
 
+from __future__ import annotations
+
 import logging
+from typing import TYPE_CHECKING
 
 from realizer.animation.fap.conversion import FapMapping
 from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings
 from realizer.face.fap_mapping import mapping_of
-from realizer.face.load import face_name, list_faces, load_face
-from realizer.face.model import Face
+
+if TYPE_CHECKING:
+    from realizer.face.model import Face
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +33,8 @@ class CharacterFaces:
         Raises:
             FaceError: no such face, or it cannot be loaded. Clients get the text: it names no folder.
         """
+        from realizer.face.load import face_name, list_faces
+
         known = [info.name for info in list_faces()]
         if face_name(name) not in known:
             raise FaceError(f"wanted one of {', '.join(known)}, got {name!r}")
@@ -43,6 +49,8 @@ class CharacterFaces:
 
     def name(self, index: int) -> str:
         """Return the name of a character's face."""
+        from realizer.face.load import face_name
+
         return face_name(self.assigned.get(index, self._settings.face))
 
     def of(self, index: int) -> Face:
@@ -54,4 +62,6 @@ class CharacterFaces:
         return mapping_of(self.name(index), self._settings.mapping)
 
     def _load(self, name: str) -> Face:
+        from realizer.face.load import load_face
+
         return load_face(name, deformer=self._settings.deformer)

@@ -20,7 +20,6 @@ from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import HEARD, AudioClips, ClipError, heard_samples
 from realizer.server.speech.speech_streams import PATIENCE
-from realizer.speech.registry import find_voice
 
 # Messages that affect only their own connection: they are not written to the journal.
 PASSING = (*get_args(Query), requests.Subscribe, requests.Unsubscribe, requests.Track)
@@ -176,6 +175,8 @@ class ControlHandlers:
         if message.face is not None:
             self.faces.check(message.face)
         if message.voice is not None:
+            from realizer.speech.registry import find_voice
+
             find_voice(message.voice).close()  # report an unknown voice now, not with the next speech
         index = character_index(self.player, message.id)
         if message.face is not None:

@@ -4,25 +4,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from realizer.animation.axis import AU_NAMES
-from realizer.behaviours.registry import KINDS
 from realizer.core.settings import Settings
-from realizer.emotions.words import known_words
 from realizer.expressions.library import library_of
-from realizer.face.load import list_faces, load_face
 from realizer.playback.player import Player
 from realizer.protocol.messages import replies, requests
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL, MAX_FPS, PICTURES, PROTOCOL
 from realizer.protocol.streams import STREAMS
-from realizer.render.cameras import camera_names
-from realizer.render.light import presets
 from realizer.server.documents.document_queue import Submission
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Connections
 from realizer.server.session.effects import MoveConnection, Write
-from realizer.speech.registry import voices
-from realizer.tables.lexemes import face_lexemes, head_lexemes
 
 # The limits that are settings `max_NAME`.
 NAMED_LIMITS = [name for name in replies.Limits.model_fields if hasattr(Settings, f"max_{name}")]
@@ -130,6 +122,15 @@ class QueryHandlers:
 
 def capabilities_of(settings: Settings) -> dict[str, Any]:
     """Return the capabilities of the service without its streams: names that documents and messages use."""
+    from realizer.animation.axis import AU_NAMES
+    from realizer.behaviours.registry import KINDS
+    from realizer.emotions.words import known_words
+    from realizer.face.load import list_faces, load_face
+    from realizer.render.cameras import camera_names
+    from realizer.render.light import presets
+    from realizer.speech.registry import voices
+    from realizer.tables.lexemes import face_lexemes, head_lexemes
+
     return {
         "behaviours": sorted(tag.partition("}")[2] for tag in KINDS),
         "lexemes": {"faceLexeme": sorted(face_lexemes()), "head": sorted(head_lexemes())},

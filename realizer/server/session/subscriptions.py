@@ -5,14 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.face.surface import face_scale
 from realizer.playback.player import Player
 from realizer.protocol.messages.common import PICTURES
 from realizer.protocol.messages.replies import ErrorMessage, FaceChanged, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
 from realizer.protocol.streams import STREAMS
-from realizer.render.cameras import camera_names
-from realizer.render.light import presets
 from realizer.server.documents.limits import MAX_CHARACTERS, pixel_rate_error
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import (
@@ -151,6 +148,9 @@ class Subscriptions:
         return new, fields | ahead | {"index": index, "fps": fps, "frame": first}
 
     def _render_options(self, message: Subscribe, index: int) -> RenderOptions:
+        from realizer.render.cameras import camera_names
+        from realizer.render.light import presets
+
         settings, largest = self.settings, self.settings.max_size
         if not all(16 <= side <= largest for side in message.size):
             text = f"wanted sides of 16..{largest} pixels, got {list(message.size)} {limit_hint('max_size')}"
@@ -175,6 +175,8 @@ class Subscriptions:
         )
 
     def _mesh(self, index: int) -> dict[str, Any]:
+        from realizer.face.surface import face_scale
+
         face = self.faces.of(index)
         scale, offset = face_scale(face)
         return {

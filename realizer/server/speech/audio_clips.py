@@ -11,7 +11,6 @@ from realizer.protocol.wire import ClipPiece
 from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.clip import ArrivingClip, Clip, samples_of
 from realizer.speech.recorded.recorded_speech import sound_of
-from realizer.speech.sound_visemes.recogniser import LOWEST, VisemeRecogniser
 from realizer.speech.utterance import RATES, Phoneme, Recording, Word
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
@@ -89,6 +88,8 @@ class AudioClips:
         if size > MAX_BYTES:
             raise ClipError(where, f"wanted at most {MAX_BYTES} bytes, got {size}")
         if begins:
+            from realizer.speech.sound_visemes.recogniser import LOWEST, VisemeRecogniser
+
             self.recordings.pop(piece.id, None)
             self._clips[piece.id] = clip
             clip.rate, clip.pieces = piece.rate, pieces

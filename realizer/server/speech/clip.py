@@ -1,17 +1,21 @@
 """A sound clip, and its division into parts that are spoken while it arrives."""
 
+from __future__ import annotations
+
 import base64
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.protocol.messages.speech import TimedText
-from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
 from realizer.speech.utterance import Phoneme
+
+if TYPE_CHECKING:
+    from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
 
 FIRST = 0.2  # s; the least length of a part
 HOLD = 1.0  # s; a last word whose end is not known waits at most so long for the end of the clip
@@ -61,7 +65,7 @@ class Clip:
         }
 
     @classmethod
-    def from_json(cls, fields: Mapping[str, Any]) -> Self:
+    def from_json(cls, fields: Mapping[str, Any]) -> Clip:
         """Return the clip that `to_json` wrote.
 
         Raises:

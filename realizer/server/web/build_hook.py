@@ -1,5 +1,7 @@
 """The build hook of the page, which bundles the sources into `realizer/server/static`."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import os

@@ -8,12 +8,9 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.face.load import face_tool
 from realizer.protocol.messages.replies import ErrorMessage
-from realizer.server.design.requests import answer
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, Grant
-from realizer.server.http.page_tools import lint
 from realizer.server.http.requests import path_of, session_of
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
@@ -171,6 +168,9 @@ class WebSocketConnections:
 
     async def _check(self, client: ClientSocket) -> None:
         """Serve the WebSocket of an editor: answer each text that arrives, BML by its faults."""
+        from realizer.server.design.requests import answer
+        from realizer.server.http.page_tools import lint
+
         loop = asyncio.get_running_loop()
         while (text := await client.receive()) is not None:
             if isinstance(text, bytes):
@@ -184,11 +184,12 @@ class WebSocketConnections:
 
     async def _edit(self, client: ClientSocket) -> None:
         """Serve the WebSocket of a page that edits a face or labels: answer its messages in their order."""
+        from realizer.face.load import face_tool
+        from realizer.server.edits.labelling import Labelling
+
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
         if path_of(client.target) == "/label":
-            from realizer.server.edits.labelling import Labelling  # slow to load
-
             tool = Labelling(self._settings.corpus, may_save=may_save)
         else:
             tool = face_tool("Studio")(self._settings.edit if may_save else None)
