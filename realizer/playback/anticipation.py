@@ -1,6 +1,6 @@
 """Anticipated points: times that clients announce, and how soon they can be for what is tied to them."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import repeat
 from math import inf
 
@@ -19,10 +19,10 @@ def anticipators_of(block: Block) -> set[str]:
     return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}
 
 
-def lead_time(group: Collection[ActiveBlock], id: str, sync: str, now: float) -> float:
-    """Return the earliest possible time of an anticipated point, seconds on the session clock.
+def lead_times(group: Collection[ActiveBlock], id: str, syncs: Iterable[str], now: float) -> dict[str, float]:
+    """Return the earliest possible time of each point `anticipators:id:sync`, seconds on the session clock.
 
-    Points of the group that are tied to it, directly or through others, come after the least times behind
+    Points of the group that are tied to one, directly or through others, come after the least times behind
     those that have passed.
     """
     tied: dict[Point, list[tuple[Point, float]]] = {}
@@ -30,7 +30,16 @@ def lead_time(group: Collection[ActiveBlock], id: str, sync: str, now: float) ->
         for point, other, seconds in _ties(playing.block):
             tied.setdefault(other, []).append((point, seconds))
     by_id = {playing.block.id: playing for playing in group}
-    delays = {(ANTICIPATORS, id, sync): 0.0}  # how much later than the anticipated one points are
+    return {sync: _lead_time(tied, by_id, (ANTICIPATORS, id, sync), now) for sync in syncs}
+
+
+def _lead_time(
+    tied: Mapping[Point, list[tuple[Point, float]]],
+    by_id: Mapping[str, ActiveBlock],
+    anticipated: Point,
+    now: float,
+) -> float:
+    delays = {anticipated: 0.0}  # how much later than the anticipated one points are
     soonest, todo = now, list(delays)
     for target in todo:
         for point, seconds in tied.get(target, ()):

@@ -10,7 +10,7 @@ from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContex
 from realizer.core import work
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks, BlockRejectedError
-from realizer.playback.anticipation import anticipators_of, lead_time
+from realizer.playback.anticipation import anticipators_of, lead_times
 from realizer.playback.block_commands import CommandError, execute
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Character
@@ -274,7 +274,8 @@ class BlockManager:
         self.advance(now, starts_before=now)
         tied = [p for p in self.blocks.active() if p.start < inf and id in anticipators_of(p.block)]
         groups = [[p, *self.timeline.linked_blocks(p, now)] for p in tied]
-        soonest = {sync: max([now, *(lead_time(g, id, sync, now) for g in groups)]) for sync in syncs}
+        leads = [lead_times(group, id, syncs, now) for group in groups]
+        soonest = {sync: max([now, *(lead[sync] for lead in leads)]) for sync in syncs}
         self.blocks.anticipate(id, {sync: max(time, soonest[sync]) for sync, time in syncs.items()})
         if (beyond := len(self.blocks.anticipators) - ANTICIPATORS) > 0:
             wanted = {id}.union(*(anticipators_of(p.block) for p in self.blocks.active()))

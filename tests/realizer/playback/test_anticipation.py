@@ -8,7 +8,7 @@ from bml_schema import parse
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock
-from realizer.playback.anticipation import anticipators_of, lead_time
+from realizer.playback.anticipation import anticipators_of, lead_times
 from realizer.playback.block_planner import plan
 
 WAIT = '<bml id="a"><wait id="w" start="0" end="anticipators:clock:beat"/></bml>'
@@ -46,17 +46,18 @@ def test_anticipators_are_those_that_behaviours_refer_to() -> None:
         ),
     ],
 )
-def test_lead_time_is_the_least_time_of_what_is_tied_to_a_point(body: str, least: float) -> None:
+def test_lead_times_is_the_least_time_of_what_is_tied_to_a_point(body: str, least: float) -> None:
     group = [playing(WAIT), playing(f'<bml id="b">{body}</bml>')]
-    assert lead_time(group, "clock", "beat", 4.0) == pytest.approx(4.0 + least, abs=0.021)
-    assert lead_time(group, "clock", "other", 4.0) == 4.0
+    found = lead_times(group, "clock", ("beat", "other"), 4.0)
+    assert found["beat"] == pytest.approx(4.0 + least, abs=0.021)
+    assert found["other"] == 4.0
 
 
-def test_lead_time_keeps_the_least_gap_behind_a_point_that_has_passed() -> None:
+def test_lead_times_keeps_the_least_gap_behind_a_point_that_has_passed() -> None:
     group = [
         playing(WAIT),
         playing('<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="0" end="a:w:end"/></bml>'),
     ]
     relax = group[1].schedule.at("f", "relax")
-    assert lead_time(group, "clock", "beat", relax + 0.01) == pytest.approx(relax + 0.04)
-    assert lead_time(group, "clock", "beat", 9.0) == 9.0, "all has passed"
+    assert lead_times(group, "clock", ["beat"], relax + 0.01)["beat"] == pytest.approx(relax + 0.04)
+    assert lead_times(group, "clock", ["beat"], 9.0)["beat"] == 9.0, "all has passed"
