@@ -311,14 +311,19 @@ LATE = [
 ]
 
 
-@pytest.mark.parametrize("body", LATE)
-def test_advance_ends_what_is_tied_to_a_speech_that_is_closed_late(body) -> None:
+def closed_late(body: str) -> Client:
+    """Play a speech beside a block; it is closed 2 s after its last sentence."""
     driver = Talker()
     driver.append("Hello there. ")
     driver.send(f'<bml id="b">{body}</bml>')
     driver.run(2.5)
     driver.append(close=True)
-    client = driver.run(12)
+    return driver.run(12)
+
+
+@pytest.mark.parametrize("body", LATE)
+def test_advance_ends_what_is_tied_to_a_speech_that_is_closed_late(body) -> None:
+    client = closed_late(body)
     at = times(client)
     assert 2.5 <= at["turn:end"] < 2.7, "as soon as the motion can end"
     assert at["b:end"] < 3.5
@@ -326,12 +331,7 @@ def test_advance_ends_what_is_tied_to_a_speech_that_is_closed_late(body) -> None
 
 
 def test_advance_ends_a_speech_that_is_closed_too_late_for_others() -> None:
-    driver = Talker()
-    driver.append("Hello there. ")
-    driver.send(f'<bml id="b"><{FACE} start="turn:turn:end-3" end="turn:turn:end"/></bml>')
-    driver.run(2.5)
-    driver.append(close=True)
-    client = driver.run(12)
+    client = closed_late(f'<{FACE} start="turn:turn:end-3" end="turn:turn:end"/>')
     assert "b:end" in times(client)
     assert times(client)["turn:end"] < 3.5
     assert {f.type for f in client.feedback if isinstance(f, WarningFeedback)} == {"IMPOSSIBLE_TO_SCHEDULE"}
