@@ -125,9 +125,8 @@ class Router:
         if is_answer and request is not None:
             self._request, self._answer = None, reply
         elif reply["type"] in ("error", "gap"):
-            is_repeated = (
-                bool(self.errors) and self.errors[-1] == reply
-            )  # by each message of a refused speech
+            # Each message of a refused speech causes the same error.
+            is_repeated = bool(self.errors) and self.errors[-1] == reply
             self.errors.append(reply)
             if reply["type"] == "error" and not is_repeated:
                 _LOG.warning("%s", ClientError.of(reply))

@@ -94,7 +94,7 @@ class OpenSpeech(ABC):
     def __init__(self, id: str, opening: Mapping[str, Any], control: Control, wait: Wait) -> None:
         self.id = id
         self.progress = SpeechProgress(id)
-        self._opening: dict[str, Any] | None = dict(opening)  # None: the service knows of it
+        self._opening = dict(opening)
         self._control = control
         self._wait = wait
         self._closed = self._stopped = False
@@ -111,7 +111,7 @@ class OpenSpeech(ABC):
 
     async def stop(self) -> None:
         """Stop speaking at once. What is appended later is ignored; a new speech may have the same id."""
-        if self._opening is not None:  # the service cannot stop what it does not know
+        if not self.progress.is_sent:  # the service cannot stop what it does not know
             await self._speech(append="")
         await self._control("stop", blocks=[self.id])
         await self._end_stopped()
@@ -146,7 +146,7 @@ class OpenSpeech(ABC):
         earlier, self.earlier = self.earlier, None
         if earlier is not None and earlier.progress.is_finished:
             await earlier._end_stopped()
-        opening, self._opening = self._opening or {}, None
+        opening = {} if self.progress.is_sent else self._opening
         self.progress.is_sent = True
         self.progress.is_closed |= bool(fields.get("close"))
         await self._control("speech", id=self.id, **opening, **fields)

@@ -34,9 +34,8 @@ class SpeechStream:
     partial_chunks: set[str] = field(default_factory=set)  # ids of blocks that speak only part of a sentence
     unplanned: list[str] = field(default_factory=list)  # ids of blocks that are not planned yet, in order
     scheduled: list[str] = field(default_factory=list)
-    words: dict[str, list[str]] = field(
-        default_factory=dict
-    )  # id of each block -> words, spoken when it ended
+    # id of each block -> words, spoken when it ended
+    words: dict[str, list[str]] = field(default_factory=dict)
     is_announced: bool = False
     is_closed: bool = False
     is_finished: bool = False  # whether the speech was cut off

@@ -164,14 +164,9 @@ class SpeechStreams:
         """
         speech = self._of(block.id)
         if speech is None or block.id == speech.id:
-            cut = [
-                chunk
-                for id in block.interrupt
-                if id in self._speeches
-                for chunk in self._speeches[id].open_chunks
-            ]
+            cut = [self._speeches[id].open_chunks for id in block.interrupt if id in self._speeches]
             if cut:
-                block = replace(block, interrupt=tuple(dict.fromkeys((*block.interrupt, *cut))))
+                block = replace(block, interrupt=tuple(dict.fromkeys(chain(block.interrupt, *cut))))
             has_syncs = any(map(self._is_speech_sync, references(block)))
             return with_references(block, self._chunk_reference) if has_syncs else block
         own = self._player.blocks.find(speech.id)
