@@ -8,7 +8,7 @@ from bml_schema.node_schema import local
 from realizer.charts.links import Link, links_of
 from realizer.charts.timeline import BehaviourRow, BlockChart, Dropped, Gap, Point, WordSpan
 from realizer.playback.active_block import ActiveBlock
-from realizer.playback.block_links import external_times
+from realizer.playback.block_links import ExternalTimes
 from realizer.playback.block_store import BlockStore
 from realizer.scheduling.timing import Schedule, Timing, Warning
 
@@ -29,7 +29,7 @@ def chart_of(playing: ActiveBlock, schedule_of: Callable[[str], Schedule | None]
     block, schedule = playing.block, playing.schedule.known
     known = playing.has_known_start
     start = schedule.start if known else None
-    links = links_of(block, schedule, external_times(schedule_of, schedule.start if known else 0.0))
+    links = links_of(block, schedule, ExternalTimes(schedule_of, schedule.start if known else 0.0))
     own = tuple(
         _behaviour_row(playing, schedule, node, start, tuple(links.get(node.id, ())))
         for node in block.behaviours

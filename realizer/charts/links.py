@@ -134,13 +134,13 @@ class _Links:
 
     def _time(self, ref: SyncRef) -> float | None:
         """Return the seconds from block start, the offset included."""
-        if ref.block not in (None, self.block.id):
-            return self.outside(ref)
-        if ref.behaviour in (None, "bml"):
+        if ref.behaviour in (None, "bml") and ref.block in (None, self.block.id):
             return ref.offset
         try:
+            if ref.block not in (None, self.block.id):
+                return self.outside(ref)
             return self.schedule.at(ref.behaviour or "", ref.point) + ref.offset
-        except KeyError:
+        except LookupError:
             return None
 
 

@@ -1,12 +1,14 @@
 """Links between a block and the active ones: dependencies, references, and what is solved together."""
 
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import islice
 from math import inf
 
 import numpy as np
 
 from bml_schema import Block, SyncRef
+from realizer.core.similar import did_you_mean, similar
 from realizer.playback.active_block import ActiveBlock, BlockMoment, Dependency
 from realizer.playback.anticipation import anticipators_of
 from realizer.playback.references import external_refs
@@ -85,37 +87,52 @@ def all_dependencies(waits: Iterable[Dependency]) -> set[int]:
     return visited
 
 
-def external_times(
-    schedule_of: Callable[[str], Schedule | None],
-    start: float,
-    fallback: Callable[[str], Schedule | None] = lambda id: None,
-) -> Callable[[SyncRef], float | None]:
-    """Return a function that maps references into other blocks to seconds from `start`, or None if unknown.
+@dataclass
+class ExternalTimes:
+    """Maps references into other blocks to seconds from `start`.
 
-    `schedule_of` maps a block id to its schedule, with `start` on the session clock; `fallback` does so for
-    points that the schedule no longer has.
+    Attributes:
+        schedule_of: block id -> its schedule, with `start` on the session clock.
+        start: seconds on the session clock.
+        fallback: as `schedule_of`, for points that the schedule no longer has.
+        suggestions: how many more errors may name similar behaviours, because to find them is slow.
     """
 
-    def instant(ref: SyncRef) -> float | None:
-        for look in (schedule_of, fallback):
+    schedule_of: Callable[[str], Schedule | None]
+    start: float
+    fallback: Callable[[str], Schedule | None] = lambda id: None
+    suggestions: int = 10
+
+    def __call__(self, ref: SyncRef) -> float | None:
+        """Return the seconds of a reference, with its offset, or None if its block has no known times.
+
+        Raises:
+            LookupError: the block has no such behaviour or sync point; the message has the existing ones.
+        """
+        planned = None
+        for look in (self.schedule_of, self.fallback):
             schedule = look(ref.block or "")
             if schedule is None or schedule.start == inf:
-                return None
-            if (time := _time(ref, schedule)) is not None:
-                return schedule.start + time + ref.offset - start
+                break
+            planned = planned or schedule
+            points = {"start": 0.0, "end": schedule.duration}
+            if ref.behaviour != "bml":
+                points = schedule[ref.behaviour or ""] if ref.behaviour in schedule.times else {}
+            if ref.point in points:
+                return schedule.start + points[ref.point] + ref.offset - self.start
+        if planned is not None:
+            raise LookupError(self._why_unknown(ref, planned))
         return None
 
-    return instant
-
-
-def _time(ref: SyncRef, schedule: Schedule) -> float | None:
-    """Return the seconds from block start of a reference, or None."""
-    if ref.behaviour == "bml":
-        return {"start": 0.0, "end": schedule.duration}.get(ref.sync or "")
-    try:
-        return schedule.at(ref.behaviour or "", ref.point)
-    except KeyError:
-        return None
+    def _why_unknown(self, ref: SyncRef, schedule: Schedule) -> str:
+        name, names = ref.behaviour or "", ["start", "end"]
+        if name != "bml":
+            if name not in schedule.times:
+                self.suggestions -= 1
+                known = islice(schedule.times, 100) if self.suggestions >= 0 else ()
+                return f"{ref}: block {ref.block} has no behaviour {name}{did_you_mean(similar(name, known))}"
+            names = list(schedule.points[name])
+        return f"{ref}: {name} has no {ref.point}, only {', '.join(names)}"
 
 
 def with_stops(

@@ -1,6 +1,7 @@
 """Steps 2 to 4 of the pipeline for one block: timings, schedule and channels."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
@@ -151,7 +152,7 @@ class _PlanBuilder:
         """
         sequences: list[tuple[str | float, str | float]] = []
         may_sequence = True
-        if any((external_times(ref) or 0.0) > UNKNOWN for ref in external_refs(self.block)):
+        if any(_is_unknown_yet(external_times, ref) for ref in external_refs(self.block)):
             self.timings = {b: timing.with_hold for b, timing in self.timings.items()}
         while True:
             priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
@@ -290,3 +291,10 @@ class _PlanBuilder:
     def with_place(self, behaviour: str, text: str) -> str:
         place = self.original.places.get(behaviour)
         return text if place is None else place.with_place(text)
+
+
+def _is_unknown_yet(external_times: Callable[[SyncRef], float | None], ref: SyncRef) -> bool:
+    """Whether a reference is to an anticipated point, such as the end of an open speech."""
+    with suppress(LookupError):
+        return (external_times(ref) or 0.0) > UNKNOWN
+    return False

@@ -76,7 +76,7 @@ class JointPlanner:
                 self._kinds,
                 arrival.context,
                 start=origin,
-                external_times=block_links.external_times(schedule_of, origin, first_schedule_of),
+                external_times=block_links.ExternalTimes(schedule_of, origin, first_schedule_of),
                 existing_claims=existing if start <= now else (),
                 others=members(others, origin, now, new=block),
                 may_stretch=may_stretch,
@@ -103,9 +103,7 @@ class JointPlanner:
     def fit(self, blocks: Sequence[ActiveBlock], origin: float, now: float) -> list[Schedule] | str:
         """Return the schedules of playing blocks at their best fit, or why there is none."""
         together = members(blocks, origin, now, is_moved=True)
-        instants = block_links.external_times(
-            self._blocks.schedule_of, origin, self._blocks.first_schedule_of
-        )
+        instants = block_links.ExternalTimes(self._blocks.schedule_of, origin, self._blocks.first_schedule_of)
         try:
             with work.limited(blocks[0].context.max_planning):
                 schedules = schedule_together(together, outside=instants)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -16,11 +17,11 @@ from realizer.core.options import PlayOptions
 from realizer.playback import block_manager
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_links import (
+    ExternalTimes,
     affected_blocks,
     all_dependencies,
     dependencies,
     existing_claims,
-    external_times,
     followers,
     with_stops,
 )
@@ -141,15 +142,34 @@ SCHEDULES = {
         (SyncRef(block="a", behaviour="h", sync="stroke", index=2), 1.0),
         (SyncRef(block="a", behaviour="bml", sync="start"), 0.0),
         (SyncRef(block="a", behaviour="bml", sync="end", offset=1.0), 3.0),
-        (SyncRef(block="a", behaviour="h", sync="ready"), None),
-        (SyncRef(block="a", behaviour="nobody", sync="end"), None),
-        (SyncRef(block="a", behaviour="bml", sync="relax"), None),
         (SyncRef(block="p", behaviour="bml", sync="start"), None),
         (SyncRef(block="nobody", behaviour="h", sync="end"), None),
     ],
 )
 def test_external_times_are_known_for_known_points(ref: SyncRef, time: float | None) -> None:
-    assert external_times(SCHEDULES.get, 10.0)(ref) == time
+    assert ExternalTimes(SCHEDULES.get, 10.0)(ref) == time
+
+
+@pytest.mark.parametrize(
+    ("name", "sync", "text"),
+    [
+        ("h", "ready", "a:h:ready: h has no ready, only start, stroke:2, end"),
+        ("hh", "end", "a:hh:end: block a has no behaviour hh, did you mean h?"),
+        ("bml", "relax", "a:bml:relax: bml has no relax, only start, end"),
+    ],
+)
+def test_external_times_have_errors_with_the_names_of_a_block(name: str, sync: str, text: str) -> None:
+    with pytest.raises(LookupError, match=re.escape(text)):
+        ExternalTimes(SCHEDULES.get, 10.0)(SyncRef(block="a", behaviour=name, sync=sync))
+
+
+def test_external_times_suggest_similar_names_ten_times() -> None:
+    times, texts = ExternalTimes(SCHEDULES.get, 10.0), []
+    for _ in range(12):
+        with pytest.raises(LookupError) as error:
+            times(SyncRef(block="a", behaviour="hh", sync="end"))
+        texts.append(str(error.value))
+    assert [("did you mean" in text) for text in texts] == 10 * [True] + 2 * [False]
 
 
 @given(st.floats(0, 20))
