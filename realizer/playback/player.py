@@ -288,6 +288,8 @@ class Player(BlockManager):
             starts = p.state is State.LURKING and p.start <= now
             status = next_state(p.state, BlockEvent.START) if starts else p.state
             blocks.append({"id": p.block.id, "character": p.block.character_id, "status": status.value})
+            if waits := [wait.block.block.id for wait in p.dependencies if p.is_waiting]:
+                blocks[-1]["waits_for"] = waits
             if p.has_known_start:
                 end = p.end if p.schedule.duration < UNKNOWN else None
                 blocks[-1] |= {"start": p.start, "end": end}

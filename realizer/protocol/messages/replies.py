@@ -113,6 +113,9 @@ class BlockState(Reply):
     start: Seconds | None = Field(None, description="seconds on the session clock")
     end: Seconds | None = None
     behaviours: list[str] | None = Field(None, description="ids of the running behaviours")
+    waits_for: list[str] | None = Field(
+        None, description="blocks, syncs of open speeches, and own speeches without sound, that it waits for"
+    )
 
 
 class LayerState(Reply):

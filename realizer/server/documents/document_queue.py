@@ -201,6 +201,12 @@ class Submission:
         else:
             self._request_speech(pending, requests)
 
+    def awaited_by(self, pending: PendingBlock) -> list[str]:
+        """Return what a block waits for: other blocks, its own speeches, and syncs of open speeches."""
+        blocks = [other.block.id for other in self.pending.blocks if other in pending.predecessors]
+        speeches = [f"{pending.block.id}:{id}" for id in self.tts.requested(pending)]
+        return list(dict.fromkeys([*blocks, *speeches, *self.speeches.awaited_syncs(pending.block)]))
+
     def _plan_next(self, t: float) -> bool:
         """Plan the first block that is ready. Return False if there is none."""
         pending = self.pending.first_ready()

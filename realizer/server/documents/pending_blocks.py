@@ -196,6 +196,10 @@ class TtsRequests:
             pending.requests.add(self.request_count)
         return speaks
 
+    def requested(self, pending: PendingBlock) -> list[str]:
+        """Return the behaviours of a block that wait for their voice."""
+        return [r.behaviour for id, r in self._requests.items() if id in pending.requests]
+
     def unfinished(self, pending: PendingBlock) -> set[str]:
         """Return the behaviours of a block whose texts are not complete."""
         requests = self._requests.values()

@@ -100,7 +100,12 @@ class QueryHandlers:
     def _state(self, connection: Connection, t: float) -> replies.StateMessage:
         state = self.player.state(t)
         preparing = [
-            replies.BlockState(id=w.block.id, character=w.block.character_id, status="IN_PREP")
+            replies.BlockState(
+                id=w.block.id,
+                character=w.block.character_id,
+                status="IN_PREP",
+                waits_for=self.submission.awaited_by(w) or None,
+            )
             for w in self.submission.pending.blocks
         ]
         characters = [

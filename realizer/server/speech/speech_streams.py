@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import chain
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
+from realizer.core.similar import similar
 from realizer.playback.player import Player
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
@@ -184,8 +185,13 @@ class SpeechStreams:
 
     def awaits_sync(self, block: Block) -> bool:
         """Whether a block refers to a sync of a speech that may still arrive."""
+        return bool(self.awaited_syncs(block))
+
+    def awaited_syncs(self, block: Block) -> list[str]:
+        """Return the references of a block to syncs of speeches that may still arrive."""
         named = filter(self._is_speech_sync, references(block))
-        return any(self._speeches[ref.block or ""].awaits_sync(ref.sync or "") for ref in named)
+        awaited = (ref for ref in named if self._speeches[ref.block or ""].awaits_sync(ref.sync or ""))
+        return [f"{ref.block}:{ref.behaviour}:{ref.point}" for ref in awaited]
 
     # their states ---------------------------------------------------------------------------------
 
@@ -276,8 +282,11 @@ class SpeechStreams:
     def _chunk_reference(self, ref: SyncRef) -> SyncRef:
         if not self._is_speech_sync(ref):
             return ref
-        chunk = self._speeches[ref.block or ""].marks.get(ref.sync or "")
-        return ref if chunk is None else replace(ref, block=chunk)
+        speech, sync = self._speeches[ref.block or ""], ref.sync or ""
+        if sync not in speech.marks and not speech.awaits_sync(sync):
+            # The warning names the syncs of the chunk that it is looked for in.
+            sync = next(iter(similar(sync, speech.marks, most=1)), sync)
+        return replace(ref, block=speech.marks[sync]) if sync in speech.marks else ref
 
     def _forget(self, id: str) -> None:
         self._player.blocks.drop_anticipators([self._speeches.pop(id).anticipator])

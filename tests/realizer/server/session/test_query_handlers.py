@@ -39,6 +39,17 @@ def test_state_lists_playing_and_waiting_blocks() -> None:
     assert state["connections"] == 1
 
 
+def test_state_says_what_a_block_waits_for() -> None:
+    driver = Driver(mute=True)
+    driver.send(NOD.format("nod"))
+    driver.send('<bml id="next" composition="APPEND"><wait id="w" duration="1"/></bml>')
+    driver.send(TALK.format("talk"))
+    driver.send('<bml id="tied"><wait id="w" start="talk:bml:end" duration="1"/></bml>')
+    (state,) = driver.send({"type": "state"}).of("state")
+    waits = {b["id"]: b.get("waits_for") for b in state["blocks"]}
+    assert waits == {"nod": None, "next": ["nod"], "talk": ["talk:s"], "tied": ["talk"]}
+
+
 def test_state_lists_the_layers_of_the_face(drive) -> None:
     driver = drive(idle=False)
     mood = '<mood xmlns="urn:bml-realizer:1" id="s" name="joy" end="1"/>'

@@ -135,6 +135,17 @@ def test_awaits_sync_ends_when_the_speech_is_closed() -> None:
     assert "turn:end" in at
 
 
+def test_speech_streams_suggest_a_sync_for_one_that_never_came() -> None:
+    driver = Talker()
+    driver.append('One <sync id="important"/>two. ')
+    driver.send('<bml id="b"><head id="n" lexeme="NOD" stroke="turn:turn:importent"/></bml>')
+    (block,) = [b for b in driver.send({"type": "state"}).of("state")[-1]["blocks"] if b["id"] == "b"]
+    assert block["waits_for"] == ["turn:turn:importent"]
+    driver.append("", close=True)
+    (warning,) = [f for f in driver.run(3).feedback if isinstance(f, WarningFeedback) and f.id == "b:n"]
+    assert "turn has no importent, only start, important, end" in warning.text
+
+
 def test_awaits_sync_ends_when_the_speech_is_cut_off() -> None:
     driver = Talker()
     driver.append("One two three. ")
