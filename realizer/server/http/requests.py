@@ -11,6 +11,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from realizer.core.settings import Settings
+from realizer.core.similar import did_you_mean, similar
 from realizer.server.http.access import AccessControl
 from realizer.server.http.http_site import FRAMES, TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
@@ -41,9 +42,12 @@ def session_of(target: str) -> tuple[str | None, int | None]:
     """Return the session and the number in `?session=ID&seen=N`.
 
     Raises:
-        JoinError: 400, `seen` is not a number.
+        JoinError: 400, `seen` is not a number, or a parameter is a misspelt one.
     """
     query = query_of(target)
+    for name in sorted(query.keys() - PARAMETERS)[:8]:
+        if near := did_you_mean(similar(name, PARAMETERS, most=1, cutoff=0.7)):
+            raise JoinError(400, f"the address has an unknown parameter {name[:80]!r}{near}")
     session, seen = query.get("session") or None, query.get("seen")
     if seen is None:
         return session, None
@@ -76,6 +80,7 @@ def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
 
 log = logging.getLogger(__name__)
 
+PARAMETERS = frozenset({"session", "seen", "token"})  # of a WebSocket's address; others are ignored
 SOCKETS = ("/ws", "/check", "/studio", "/label")  # paths of WebSockets
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 
 import pytest
 from websockets.datastructures import Headers
@@ -76,6 +77,14 @@ def test_session_of_refuses_a_bad_number_in_seen(seen: str) -> None:
     with pytest.raises(JoinError, match="seen: wanted the number of the last feedback that came") as refused:
         session_of(f"/ws?session=show&seen={seen}")
     assert refused.value.status == 400
+
+
+def test_session_of_refuses_a_misspelt_parameter() -> None:
+    text = "the address has an unknown parameter 'seesion', did you mean session?"
+    with pytest.raises(JoinError, match=re.escape(text)) as refused:
+        session_of("/ws?seesion=show")
+    assert refused.value.status == 400
+    assert session_of("/ws?session=show&nocache=7") == ("show", None)
 
 
 def test_headers_of_and_query_of_take_the_last_of_one_name() -> None:
