@@ -15,12 +15,12 @@ from realizer.knowledge.enrich import Enricher, SpokenText
 from realizer.knowledge.word_languages import Words, language_of
 from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech
+from realizer.sources import is_file_name
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import MAX_TEXT
 from realizer.tables.emotional_words import words_of
 from realizer.tables.knowledge import Role, knowledge
 
-FILES = (".bml", ".xml", ".txt")  # suffixes of a single word that is meant to be a file name
 ROLES = ("speaker", "listener")
 MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # but not "<3"
 MARKED = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])|\xff\xfe|\xfe\xff")
@@ -73,11 +73,6 @@ def enrich(
     if not enriched.blocks:
         raise enriched.errors[0]
     return enriched.bml
-
-
-def is_file_name(text: str) -> bool:
-    """Return whether a text is a single word with the suffix of a file."""
-    return not text.split()[1:] and text.lower().rstrip().endswith(FILES)
 
 
 @dataclass

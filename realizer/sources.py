@@ -13,7 +13,8 @@ from bml_schema.element_reader import Vocabulary
 
 Source = str | bytes | Path
 # Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.
-SUFFIXES = (".bml", ".xml", ".txt", ".toml", ".json")
+SUFFIXES = (".txt", ".bml", ".xml", ".toml", ".json")
+LONGEST_PATH = 1024  # characters
 LONGEST = 10_000  # characters of one speech, as in `_PIECE`
 # A part of a long text: up to the last end of a sentence in it, or else the last blank, or else cut.
 _PIECE = re.compile(
@@ -34,12 +35,16 @@ class Document(NamedTuple):
 def is_file_name(text: str) -> bool:
     """Return whether a text names a file: by its suffix, a path separator, or because it exists.
 
-    Without a separator, a file needs a suffix and under 64 characters: other words are spoken.
+    Several words are one only if it exists, or if they end in a suffix of BML or a timeline: others are
+    spoken, as are words without suffix and separator.
     """
-    named = text.lower().endswith(SUFFIXES) or any(s in text for s in (os.sep, os.altsep) if s)
-    return "<" not in text and (
-        named or (len(text) < 64 and bool(Path(text).suffix) and Path(text).is_file())
-    )
+    if "<" in text or len(text) > LONGEST_PATH:
+        return False
+    is_path = any(s in text for s in (os.sep, os.altsep) if s)
+    named = text.lower().endswith(SUFFIXES) or is_path
+    if len(text.split()) == 1 or text.lower().endswith(SUFFIXES[1:]):
+        return named or (bool(Path(text).suffix) and _is_readable(Path(text)))
+    return (is_path or bool(Path(text).suffix)) and _is_readable(Path(text))
 
 
 def documents_of(source: Source | Iterable[Source]) -> list[Document]:
@@ -84,14 +89,22 @@ def document_of(item: object, number: int = 1) -> Document:
     if not isinstance(item, Source):
         raise TypeError(f"source: wanted {WANTED}, got {_type(item)}")
     if isinstance(item, str) and is_file_name(item):
-        if not Path(item).is_file():
-            words = "no such file; a text with such an end or a path separator is spoken from a .txt file"
+        if not _is_readable(Path(item)):
+            words = "no such file; a single word with / or such an end is the name of one, not spoken"
             raise FileNotFoundError(errno.ENOENT, words, item)
         item = Path(item)
     if isinstance(item, Path):
         content, is_text = item.read_bytes(), item.suffix.lower() == ".txt"
         return Document(_bml(content, number) if is_text else content, str(item))
     return Document(_bml(item, number), "")
+
+
+def _is_readable(path: Path) -> bool:
+    """Return whether there is a file, or a pipe, of this name."""
+    try:
+        return path.exists() and not path.is_dir()
+    except (OSError, ValueError):  # no possible name
+        return False
 
 
 def _bml(content: str | bytes, number: int) -> str | bytes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable, Mapping
 from functools import partial
@@ -151,16 +150,10 @@ def _is_foreign(text: str | bytes, language: str) -> bool:
 
 def _read(text: str) -> str | bytes:
     """Return the text, or the content of the file or standard input; XML names its encoding: bytes."""
-    from realizer.enrichment import MARKED, is_file_name
+    from realizer.enrichment import MARKED
+    from realizer.sources import is_file_name
 
-    try:
-        is_file = text == "-" or Path(text).is_file()
-        is_folder = Path(text).is_dir() and os.sep in text
-    except (OSError, ValueError):  # too long for a name
-        is_file = is_folder = False
-    if not is_file:
-        if is_folder or is_file_name(text):
-            raise click.UsageError(f"{text}: wanted a text or an existing file; - reads standard input")
+    if text != "-" and not is_file_name(text):
         return text
     data = inputs.read_file(text)
     return data if MARKED.match(data) else inputs.decode(data, text, "a text")

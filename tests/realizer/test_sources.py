@@ -18,7 +18,18 @@ def text_of(bml: str | bytes) -> str:
 
 @pytest.mark.parametrize(
     ("text", "is_file"),
-    [("hello.bml", True), ("talk.TXT", True), ("a/b", True), ("Hello there", False), ("e.g. this.", False)],
+    [
+        ("hello.bml", True),
+        ("talk.TXT", True),
+        ("a/b", True),
+        ("my scene.bml", True),
+        ("Hello there", False),
+        ("e.g. this.", False),
+        ("Do it 24/7.", False),
+        ("Read the README.txt", False),
+        (300 * "and/or ", False),
+        ("a/b\0 c", False),
+    ],
 )
 def test_is_file_name_of_a_suffix_or_a_path(text: str, is_file: bool) -> None:
     assert is_file_name(text) is is_file
