@@ -3,6 +3,7 @@
 import errno
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from bml_schema import parse
@@ -14,7 +15,7 @@ from realizer.playback.player import Player
 from realizer.playback.speaking import open_voice, submit_with_speech
 from realizer.result import Realization
 from realizer.scheduling.timing import Schedule
-from realizer.sources import Source, documents_of, first_error
+from realizer.sources import Source, documents_of, first_error, folder_of
 from realizer.speech.utterance import Voice
 
 
@@ -45,8 +46,9 @@ def realize(
 
     Args:
         source: BML, a text to speak, a file, or a list of these, which are submitted at 0 s, in order. A
-            string that ends in .bml, .xml or .txt or holds a path separator is the name of a file; any other
-            string, or bytes, without "<" are spoken.
+            word that ends in .bml, .xml or .txt or holds a path separator is the name of a file; any other
+            string, or bytes, without "<" are spoken. A sound file is played; the lips follow it. Without
+            `media`, documents find their files in their own folder.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
         face, deformer, fps, scene, seed, idle, liveliness, language, media, expressions, cooccurrence,
             prosody, jaw, lips, mapping, grace, max_planning, strict_bml: as in
@@ -81,6 +83,8 @@ def realize(
         strict_bml=strict_bml,
     )
     documents = documents_of(source)
+    if options.media is None:
+        options = replace(options, media=folder_of(document.file for document in documents))
     played = pipeline.play([document.bml for document in documents], options, _checked(voice))
     if not played.schedules:
         raise first_error(documents, VOCABULARY, strict_bml=strict_bml)
@@ -108,6 +112,8 @@ def schedule(
     documents = documents_of(source)
     if len(documents) > 1:
         raise ValueError(f"source: wanted one document, got {len(documents)}")
+    if options.media is None:
+        options = replace(options, media=folder_of([documents[0].file]))
     block = parse(documents[0].bml, VOCABULARY, strict_bml=strict_bml)
     player = Player(options, animates=False)
     with open_voice(_checked(voice)) as speaker:

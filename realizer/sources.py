@@ -6,14 +6,17 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
 
-from bml_schema import Block, BMLError, Speech, read, write
+from bml_schema import CORE, Block, BMLError, Speech, read, write
 from bml_schema.behaviours import SpeechText
 from bml_schema.element_reader import Vocabulary
+from bml_schema.nodes import BMLT
 
 Source = str | bytes | Path
-# Suffixes of files that we read. A text in a .txt file is spoken; those of timelines are read by `check`.
+# Suffixes of documents. A text in a .txt file is spoken; those of timelines are read by `check`.
 SUFFIXES = (".txt", ".bml", ".xml", ".toml", ".json")
+SOUNDS = (".wav", ".flac", ".ogg", ".opus", ".mp3", ".webm")  # of recordings of speech
 LONGEST_PATH = 1024  # characters
 LONGEST = 10_000  # characters of one speech, as in `_PIECE`
 # A part of a long text: up to the last end of a sentence in it, or else the last blank, or else cut.
@@ -41,7 +44,7 @@ def is_file_name(text: str) -> bool:
     if "<" in text or len(text) > LONGEST_PATH:
         return False
     is_path = any(s in text for s in (os.sep, os.altsep) if s)
-    named = text.lower().endswith(SUFFIXES) or is_path
+    named = text.lower().endswith(SUFFIXES + SOUNDS) or is_path
     if len(text.split()) == 1 or text.lower().endswith(SUFFIXES[1:]):
         return named or (bool(Path(text).suffix) and _is_readable(Path(text)))
     return (is_path or bool(Path(text).suffix)) and _is_readable(Path(text))
@@ -65,6 +68,16 @@ def documents_of(source: Source | Iterable[Source]) -> list[Document]:
     return documents
 
 
+def folder_of(files: Iterable[str]) -> Path | None:
+    """Return the folder in which all of these files are, where documents then find files; else None.
+
+    Texts, BML and names of no file, such as "-", have no folder.
+    """
+    paths = [Path(file) for file in files if is_file_name(file)]
+    folders = {path.resolve().parent for path in paths if path.is_file()}
+    return folders.pop() if len(folders) == 1 else None
+
+
 def first_error(documents: Sequence[Document], vocabulary: Vocabulary, *, strict_bml: bool) -> BMLError:
     """Return the error of documents of which none can be read; its text names the file."""
     parts = ((part, d) for d in documents for part in read(d.bml, vocabulary, strict_bml=strict_bml))
@@ -84,6 +97,13 @@ def spoken(text: str, number: int = 1) -> str:
     return "".join(blocks)
 
 
+def recorded(file: str, number: int = 1) -> str:
+    """Return the document that plays a sound file of the media folder; the lips follow its sound."""
+    audio = f'<audiofile xmlns="{BMLT}" fileName={quoteattr(file)}/>'
+    speech = f'<speech id="speech"><description priority="1" type="audio">{audio}</description></speech>'
+    return f'<bml xmlns="{CORE}" id="text{number}" composition="APPEND">{speech}</bml>'
+
+
 def document_of(item: object, number: int = 1) -> Document:
     """Return the document of one source; `number` is its place among several. Errors as `documents_of`."""
     if not isinstance(item, Source):
@@ -94,6 +114,8 @@ def document_of(item: object, number: int = 1) -> Document:
             raise FileNotFoundError(errno.ENOENT, words, item)
         item = Path(item)
     if isinstance(item, Path):
+        if item.suffix.lower() in SOUNDS and item.is_file():
+            return Document(recorded(item.name, number), str(item))
         content, is_text = item.read_bytes(), item.suffix.lower() == ".txt"
         return Document(_bml(content, number) if is_text else content, str(item))
     return Document(_bml(item, number), "")

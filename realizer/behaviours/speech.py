@@ -123,6 +123,8 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         from realizer.behaviours import audio  # most speech has none
 
         faults = audio.faults(name, context)
+        if spoken is not None:
+            faults = tuple(replace(f, text=f"{f.text}; the voice speaks the text instead") for f in faults)
     elif unread := [d for d in node.descriptions if d.content.strip().startswith("clip:")]:
         got = f'a description of type "{unread[0].type}" with {unread[0].content.strip()[:80]!r}'
         wanted = f'wanted <bmlt:audiofile fileName="clip:ID"/> in its description, got {got}'

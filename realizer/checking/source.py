@@ -1,6 +1,7 @@
 """Checking of sources: `realizer.check`."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from realizer.checking.document import check_document
 from realizer.checking.finding import Finding
 from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
-from realizer.sources import Source, documents_of
+from realizer.sources import Source, documents_of, folder_of
 
 MAX_ADVICE = 20  # per block: one mistake is often repeated all over a document
 
@@ -42,7 +43,11 @@ def check(
     options = PlayOptions(scene=scene, media=media, expressions=expressions, strict_bml=strict_bml)
     found: list[Finding] = []
     for number, document in enumerate(documents_of(source), 1):
-        player, name = Player(options, animates=False), document.file or f"document {number}"
+        folder = options.media or folder_of([document.file])
+        player, name = (
+            Player(replace(options, media=folder), animates=False),
+            document.file or f"document {number}",
+        )
         found += findings_of(name, document.bml, player, MAX_ADVICE if advice else 0)
     return found
 

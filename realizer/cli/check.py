@@ -86,7 +86,7 @@ def check(
         if hasattr(stream, "reconfigure"):  # the terminal's encoding may lack characters of a document
             stream.reconfigure(errors="backslashreplace")
     scene, who = flags.pop("scene"), (flags.pop("role"), flags.pop("mood"))
-    chosen, lists = inputs.settings(**flags), words_for(flags["language"], words)
+    chosen, lists = inputs.settings(documents, **flags), words_for(flags["language"], words)
     faults = 0
     warned: set[str] = set()
     for name, text in zip(documents, inputs.read_documents(documents), strict=True):

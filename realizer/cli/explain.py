@@ -37,7 +37,7 @@ def explain(
     from realizer.charts.write_chart import WRITERS
 
     inputs.check_suffix(output, ".html", *WRITERS)
-    chosen = inputs.settings(**flags)
+    chosen = inputs.settings(documents, **flags)
     texts = inputs.read_documents(documents)
     from realizer import pipeline
     from realizer.explained import as_html, as_picture, as_text, steps_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import errno
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -50,17 +50,25 @@ def opening(path: str | Path) -> Iterator[None]:
         raise click.UsageError(f"{path}: {error.strerror or error}") from None
 
 
-def settings(**flags: Any) -> Settings:
-    """Return the settings from flags, REALIZER_* variables and defaults."""
+def settings(documents: Sequence[str] = (), **flags: Any) -> Settings:
+    """Return the settings from flags, REALIZER_* variables and defaults.
+
+    Without a media folder, documents that are all in one folder find their files there.
+    """
     with reporting(SettingsError):
-        return Settings.read(flags)
+        chosen = Settings.read(flags)
+    if chosen.media is not None or not documents:
+        return chosen
+    from realizer.sources import folder_of
+
+    return replace(chosen, media=folder_of(documents))
 
 
-def play_settings(options: Mapping[str, Any], **flags: Any) -> Settings:
-    """Return the settings for playing from the options of a command and further flags."""
+def play_settings(options: Mapping[str, Any], documents: Sequence[str] = (), **flags: Any) -> Settings:
+    """Return the settings for playing documents from the options of a command and further flags."""
     names = {"voice", *(f.name for f in fields(PlayOptions) if f.name != "idle")}
     flags |= {name: options[name] for name in names if name in options}
-    return settings(**flags, idle=False if options["no_idle"] else None)
+    return settings(documents, **flags, idle=False if options["no_idle"] else None)
 
 
 def planning_player(chosen: Settings, scene: Path | None) -> Player:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -71,25 +71,30 @@ def realize(documents: tuple[str, ...], **flags: Any) -> int:
     realizer realize "Hello there" -o hello.mp4
     realizer realize hello.bml -o hello.png --at 1.5 --camera profile
     realizer realize one.bml two.bml -o talk.fap --seed 7
+    realizer realize recording.wav -o recording.mp4
 
     Several documents are submitted at 0 s, in order; their composition attributes apply. A TEXT is spoken:
-    anything without "<" that does not end in .bml, .xml or .txt and has no path separator.
+    anything without "<" that names no file and is no single word with a path separator or the end of one.
+    The lips follow a recording.
     """
-    return play_documents(lambda: inputs.read_documents(documents), flags)
+    return play_documents(lambda: inputs.read_documents(documents), flags, documents)
 
 
-def play_documents(read: Callable[[], list[str | bytes]], flags: dict[str, Any]) -> int:
+def play_documents(
+    read: Callable[[], list[str | bytes]], flags: dict[str, Any], names: Sequence[str] = ()
+) -> int:
     """Play documents with the options of `output_options` and return the exit status.
 
     Args:
         read: returns the documents; it is called after the options have been checked.
         flags: the options by name.
+        names: of the documents, in whose folder they find their files.
     """
     from realizer.outputs.output import RenderSettings
     from realizer.outputs.registry import OUTPUTS
 
     writer = writer_for(flags["output"])
-    chosen = inputs.play_settings(flags)
+    chosen = inputs.play_settings(flags, names)
     drawing = RenderSettings(**{name: flags[name] for name in DRAWN})
     if writer is not None and writer.suffix in PICTURES:
         options.check_camera(chosen.face, drawing.camera)
@@ -186,7 +191,7 @@ def schedule(
     if plot is not None:
         with inputs.reporting(ValueError, wrong=inputs.bad("--plot")):
             chart_writer_for(plot)
-    chosen = inputs.settings(**flags)
+    chosen = inputs.settings(documents, **flags)
     player = inputs.planning_player(chosen, chosen.scene)
     texts = inputs.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)

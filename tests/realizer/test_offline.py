@@ -1,9 +1,11 @@
 """Tests of realize and schedule."""
 
 import inspect
+import wave
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bml_schema import BMLError, parse
@@ -13,6 +15,7 @@ from realizer.core.options import PlayOptions
 from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech
 from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import SpeechRequest
 from tests.cases import CASES
 from tests.rows import each_row
 
@@ -28,6 +31,22 @@ def test_realize_has_the_options_of_playing_with_their_defaults() -> None:
 def test_realize_takes_one_text_or_several() -> None:
     one, two = realize(NOD, idle=False), realize([NOD, NOD.replace('"b"', '"c"')], idle=False)
     assert (len(one.schedules), len(two.schedules)) == (1, 2)
+
+
+def test_realize_plays_a_recording_and_finds_it_beside_a_document(tmp_path: Path) -> None:
+    said = SilentVoice().say(SpeechRequest("Hello there"))
+    pcm = (8000 * np.sin(np.arange(round(22050 * said.duration)) / 30)).astype("<i2")
+    with wave.open(str(tmp_path / "talk.wav"), "wb") as file:
+        file.setparams((1, 2, 22050, len(pcm), "NONE", ""))
+        file.writeframes(pcm.tobytes())
+    audio = '<audiofile xmlns="http://hmi.ewi.utwente.nl/bmlt" id="a" fileName="talk.wav"/>'
+    (tmp_path / "talk.bml").write_text(f'<bml id="b">{audio}</bml>')
+    for source in (tmp_path / "talk.wav", tmp_path / "talk.bml"):
+        played = realize(source, idle=False)
+        assert not played.warnings
+        assert played.duration == pytest.approx(len(pcm) / 22050, abs=0.01)
+        assert np.abs(played.sound()).max() > 7000
+    assert realize(tmp_path / "talk.wav").aus.aus.any()
 
 
 def test_realize_refuses_a_rate_that_is_not_above_0() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from bml_schema import Block, BMLError, Speech, parse, read
 from realizer.behaviours.registry import VOCABULARY
-from realizer.sources import documents_of, first_error, is_file_name
+from realizer.sources import documents_of, first_error, folder_of, is_file_name
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -118,3 +118,23 @@ def test_first_error_has_the_line_the_path_and_the_file(tmp_path: Path) -> None:
     assert isinstance(error, BMLError)
     assert (error.line, error.path) == (2, "/bml")
     assert str(tmp_path / "a.bml") in str(error)
+
+
+def test_folder_of_is_the_only_folder_of_all_files(tmp_path: Path) -> None:
+    names = [str(tmp_path / name) for name in ("a.bml", "b.bml", "c/d.bml")]
+    for name in names:
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_text(NOD)
+    assert folder_of([*names[:2], "-", "", "Hello there.", NOD, str(tmp_path / "no.bml")]) == tmp_path
+    assert folder_of(names) is None
+    assert folder_of(["Hello there."]) is None
+
+
+def test_documents_of_a_sound_file_play_it(tmp_path: Path) -> None:
+    path = tmp_path / "a talk & more.wav"
+    path.write_bytes(b"RIFF")
+    (document,) = documents_of(path)
+    (block,) = read(document.bml)
+    assert isinstance(block, Block)
+    (speech,) = block.behaviours
+    assert 'fileName="a talk &amp; more.wav"' in speech.descriptions[0].content

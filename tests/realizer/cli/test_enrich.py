@@ -97,7 +97,11 @@ def test_enrich_suggests_moods_for_an_unknown_one() -> None:
 
 
 def test_enrich_refuses_the_name_of_a_missing_file(tmp_path: Path) -> None:
-    for name, fault in (("nofile.bml", "No such file"), ("talk.TXT", "No such file"), (tmp_path, "directory")):
+    for name, fault in (
+        ("nofile.bml", "No such file"),
+        ("talk.TXT", "No such file"),
+        (tmp_path, "directory"),
+    ):
         assert f"{name}: {fault}" in str(enrich(str(name)).exception).replace("Is a ", "")
     assert starts(enrich("Did you read talk.txt?").stdout)
 
