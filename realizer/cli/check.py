@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from realizer.cli import inputs, options
-from realizer.cli.enrich import language, mood, role, warn_unknown_languages, words, words_for
+from realizer.cli.enrich import mood, role, warn_unknown_languages, words, words_for
 from realizer.cli.options import option
 from realizer.cli.progress import is_quiet, note
 from realizer.cli.timeline import SUFFIXES, advice_on, faults_in
@@ -33,7 +33,7 @@ IMPOSSIBLE = "IMPOSSIBLE_LENGTH"  # type of faults by --limit
 @options.strict_bml
 @role
 @mood
-@language
+@options.language
 @words
 @option(
     "--long/--short",

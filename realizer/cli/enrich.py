@@ -46,7 +46,6 @@ mood = option(
     MoodWord(),
     shell_complete=options.completing("realizer.tables.knowledge:knowledge", "moods"),
 )
-language = option("--language TAG", "Language of text without xml:lang, as a BCP-47 tag.  [default: en-US]")
 words = option(
     "--words FILE.csv",
     "Your own emotional words, for texts in --language, or for all texts without it; the format is that "
@@ -94,7 +93,7 @@ def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | 
 @click.argument("text", metavar="TEXT|FILE|-")
 @role
 @mood
-@language
+@options.language
 @words
 @option(
     "--knowledge DIR",

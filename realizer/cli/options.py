@@ -242,6 +242,7 @@ voice = option(
     "Voice to speak with; see `realizer voices`.",
     shell_complete=completing("realizer.speech.registry:VOICES"),
 )
+language = option("--language TAG", "Language of text without xml:lang, as a BCP-47 tag.  [default: en-US]")
 scene = option("--scene", "File of gaze and pointing targets, one a line: NAME X Y Z, in metres.", FILE)
 media = option("--media DIR", "Folder of the files that documents may refer to.", FOLDER)
 expressions = option(
@@ -256,4 +257,4 @@ strict_bml = option(
     default=None,
 )
 strict = option("--strict", "Exit with 1 if any behaviour was dropped.", is_flag=True)
-playback_options = several(voice, scene, media, expressions, strict_bml, strict)
+playback_options = several(voice, language, scene, media, expressions, strict_bml, strict)
