@@ -13,6 +13,7 @@ from realizer.core.similar import did_you_mean, similar
 from realizer.speech.engine_voice import Engine, EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import read_answer, timeline
+from realizer.speech.scripts import LANGUAGES, foreign_script
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import SpeechRequest, Utterance
 
@@ -64,6 +65,11 @@ class EspeakVoice(EngineVoice):
         said = timeline(document, events, pcm, rate, lambda words: self._word_phonemes(voice, words))
         if not any(phoneme.ipa for phoneme in said.phonemes) and not script.is_silent:
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
+        id = voice.partition("+")[0]
+        tag = next((t for v in hello["voices"] if v["id"] == id for _, t in v["languages"]), "")
+        if (letters := foreign_script(script.text, tag)) is not None:
+            text = f"the text is in {letters} letters, which a voice of {tag} spells one by one"
+            warnings = (*warnings, f"{text}: wanted its language, such as {LANGUAGES[letters][0]!r}")
         return replace(said, warnings=(*script.warnings, *warnings))
 
     @cached_property

@@ -167,6 +167,13 @@ def test_choose_voice_by_name_and_variant(voice: EspeakVoice, wanted: str, engin
     assert voice.say(SpeechRequest("a", voice=wanted, language="de-DE")).duration > 0
 
 
+def test_espeak_warns_of_a_text_that_it_spells(voice: EspeakVoice) -> None:
+    (warning,) = voice.say(SpeechRequest("Привет, как дела?")).warnings
+    assert "in CYRILLIC letters, which a voice of en-us spells one by one: wanted its language" in warning
+    assert not voice.say(SpeechRequest("Привет, как дела?", language="ru")).warnings
+    assert not voice.say(SpeechRequest("Привет, как дела?", voice="ru")).warnings
+
+
 def test_choose_voice_warns_of_unknown_names(voice: EspeakVoice) -> None:
     said = voice.say(SpeechRequest("hello", language="xx-YY", voice="nobody+nothing"))
     assert said.duration > 0.3
