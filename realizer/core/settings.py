@@ -43,10 +43,10 @@ def is_loopback(host: str) -> bool:
         return host == "localhost" or host.endswith(".localhost")
 
 
-def _closest(name: str, known: Iterable[str]) -> str | None:
+def _closest(name: str, known: Iterable[str], cutoff: float = 0.8) -> str | None:
     from realizer.core.similar import similar
 
-    return next(iter(similar(name, known, 1, 0.8)), None)
+    return next(iter(similar(name, known, 1, cutoff)), None)
 
 
 def _row(
@@ -331,7 +331,7 @@ class Settings:
                     # A misspelt REALIZER_TOKEN would leave the service open.
                     raise SettingsError(f"variable {name}: wanted {PREFIX}{closest.upper()}?")
         if unknown := sorted(values.keys() - known):
-            wanted = _closest(unknown[0], known) or f"one of {', '.join(sorted(known))}"
+            wanted = _closest(unknown[0], known, 0.65) or f"one of {', '.join(sorted(known))}"
             raise SettingsError(f"setting {unknown[0]}: wanted {wanted} ({file})")
         set_flags = {name: value for name, value in (flags or {}).items() if value is not None}
         try:
