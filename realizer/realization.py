@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -158,6 +158,22 @@ class Realization:
             )
             parts.append((change.frame, part))
         return parts
+
+    def with_first(self, character: str) -> Self:
+        """Return the same realization with another character as the first, who is drawn and written.
+
+        Raises:
+            ValueError: there is no such character; the text lists them.
+        """
+        names = list(self.characters)
+        if character not in names:
+            known = ", ".join(name or "one without a name" for name in names)
+            raise ValueError(f"character: wanted one of {known}, got {character!r}")
+        order = sorted(names, key=lambda name: name != character)
+        speeches = (replace(s, character=order.index(names[s.character])) for s in self.speeches)
+        changes = self.face_changes if order == names else ()
+        characters = {name: self.characters[name] for name in order}
+        return replace(self, characters=characters, speeches=tuple(speeches), face_changes=changes)
 
     def visemes(self, character: int = 0) -> Float64:
         """Return (n, 15) float64: the weight of each MPEG-4 viseme of a character; rows add to 1.

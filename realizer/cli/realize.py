@@ -45,6 +45,7 @@ output_options = options.several(
         "File to write, in the format of its suffix; see `realizer outputs`.  [default: print JSON]",
     ),
     options.at,
+    option("--character ID", "Character to show, in formats that hold one.  [default: the first]"),
     option(
         "--morphs",
         "With .glb: morph targets that show each frame exactly, or ARKit's 52 shapes.",
@@ -114,6 +115,9 @@ def play_documents(
     if any(speaking.utterance.pcm is None for speaking in realization.speeches):
         warn_no_voice(chosen.voice)
     print_warnings(realization.warnings)
+    if flags["character"] is not None:
+        with inputs.reporting(ValueError, "--"):
+            realization = realization.with_first(flags["character"])
     if writer is None:
         json.dump(realization.to_json(), sys.stdout)
         sys.stdout.write("\n")
@@ -125,8 +129,8 @@ def play_documents(
             return 1
         save(realization, writer, path, drawing)
         first, *others = (name or "the unnamed character" for name in realization.characters)
-        if others and not writer.all_characters:
-            text = f"{path}: shows {first}, not {', '.join(others)}: the format holds one character"
+        if others and flags["character"] is None and not writer.all_characters:
+            text = f"{path}: shows {first}, not {', '.join(others)}: the format holds one; see --character"
             click.echo(text, err=True)
     dropped = any(schedule.dropped for schedule in realization.schedules)
     return 1 if realization.refusals or (flags["strict"] and dropped) else 0

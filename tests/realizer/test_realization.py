@@ -50,6 +50,19 @@ def test_sound_is_mixed_at_its_time() -> None:
     assert sound[int(1.4 * 16000)] == 1000
 
 
+def test_with_first_shows_another_character_with_its_speech() -> None:
+    text = '<bml id="{0}" characterId="{0}"><speech id="s"><text>{1}</text></speech></bml>'
+    said = text.format("Ada", "No.") + text.format("Ben", "That is a long sentence.")
+    played = realize(said, voice=SilentVoice(), idle=False)
+    ben = played.with_first("Ben")
+    assert list(ben.characters) == ["Ben", "Ada"]
+    assert np.array_equal(ben.faps.values, played.characters["Ben"].faps.values)
+    assert np.array_equal(ben.visemes(0), played.visemes(1))
+    assert np.array_equal(ben.visemes(1), played.visemes(0))
+    with pytest.raises(ValueError, match="character: wanted one of Ada, Ben, got 'Bob'"):
+        played.with_first("Bob")
+
+
 def test_visemes_are_those_of_their_character_until_a_cut() -> None:
     played = realize('<bml id="b"><wait id="w" duration="2"/></bml>', idle=False, fps=50)
     vowel = Utterance(1.0, (), (Phoneme(0.0, 1.0, "ɑ"),), {})
