@@ -117,8 +117,7 @@ class DocumentFramer:
         self._closing = mark.startswith(b"</")
         if not self._closing:
             if self._document >= 0:
-                if not self._broken:
-                    self._fault("wanted </bml> before the next <bml", self._id(start))
+                self._fault("wanted </bml> before the next <bml", self._id(start))
                 self._orphans += 1
             self._document = start
         return True
@@ -235,9 +234,9 @@ class DocumentFramer:
             self._fault(f"wanted <bml>, got {shown!r}")
 
     def _fault(self, text: str, block: str | None = None) -> None:
-        """Report a fault, once for each span between good documents."""
+        """Report a fault: of a block, or once for each span between good documents."""
         self._stray.clear()
-        if not self._broken:
+        if not self._broken or block is not None:
             self._items.append(Fault(text, block))
         self._broken = True
 

@@ -104,6 +104,12 @@ def test_framer_returns_documents_in_the_element_around_them(step: int | None) -
     assert found == [NOD, wrapped, wrapped, NOD, f"{greta}{NOD}</fml-apml>", NOD]
 
 
+def test_framer_reports_each_document_without_an_end_also_after_other_faults() -> None:
+    found = assemble(f'<foo/><bml id="f"><bml id="g"><head id="h">{NOD}')
+    assert [item.block for item in found if isinstance(item, Fault)] == [None, "f", "g"]
+    assert [item for item in found if isinstance(item, str)] == [NOD]
+
+
 def test_framer_reports_no_fault_for_the_end_of_a_document_given_up() -> None:
     found = assemble(f'<bml id="x"> {NOD} </bml> {NOD}')
     assert [type(f) for f in found] == [Fault, str, str]
