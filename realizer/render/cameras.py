@@ -1,8 +1,10 @@
 """Cameras with their presets, and the projection of points to pixels."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +37,9 @@ PRESETS: Mapping[str, Framing] = {
     "profile": Framing(yaw=-90),
     "close": Framing(hairline=0.08, chin=0.90, distance=1.5),
 }
+
+
+HEAD = 0.66  # width by height of the narrowest picture that holds the head; as in the page's stage.js
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,6 +83,11 @@ class Camera:
         )
         scale = height / 2 / math.tan(self.fovy / 2)
         return np.stack([width / 2 - scale * right / back, height / 2 + scale * up / back], axis=1), -back
+
+    def fitted(self, size: tuple[int, int]) -> Camera:
+        """Return the camera with a wider angle for a picture that is too narrow for the head, (w, h)."""
+        wider = max(1.0, HEAD * size[1] / size[0])
+        return replace(self, fovy=2 * math.atan(wider * math.tan(self.fovy / 2)))
 
     def to_json(self) -> dict[str, Any]:
         """Return the camera as JSON for the page; `fovy` is in degrees, as in WebGL libraries."""

@@ -80,7 +80,7 @@ class FaceDrawer:
         self.pixels = Pixels(order.memory, order.slots, order.size, channels(order.background))
         face = order.face
         self.face = load_face(face, deformer=order.deformer) if isinstance(face, str) else face
-        camera, light = camera_for(self.face, order.camera), preset(order.light)
+        camera, light = camera_for(self.face, order.camera).fitted(order.size), preset(order.light)
         self.backend, self.canvas = open_canvas(
             self.face, order.size, camera, light, order.background, order.backend
         )

@@ -81,3 +81,11 @@ def test_camera_to_json_gives_the_same_view(balls):
     scale = 256 / np.tan(np.radians(table["fovy"]) / 2)
     seen = [256 + scale * local[0] / -local[2], 256 - scale * local[1] / -local[2]]
     assert camera.project(point, (512, 512))[0][0] == pytest.approx(seen, abs=0.05)
+
+
+def test_fitted_camera_shows_the_whole_head_in_a_narrow_picture(balls) -> None:
+    face, _ = balls
+    camera = camera_for(face)
+    assert camera.fitted((512, 512)).fovy == pytest.approx(camera.fovy)
+    usual, narrow = (camera.fitted(size).project(face.vertices, size)[0] for size in ((330, 500), (100, 500)))
+    assert np.ptp(narrow[:, 0]) / 100 == pytest.approx(np.ptp(usual[:, 0]) / 330)
