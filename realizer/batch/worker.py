@@ -99,6 +99,7 @@ class Worker:
             "status": "refused" if realization.refusals or not realization.has_content else "done",
             "duration": round(realization.duration, 6),
             "frames": realization.frames,
+            "characters": [name or "" for name in realization.characters],
             "dropped": [id for schedule in realization.schedules for id in schedule.dropped],
             "warnings": [warning.to_json() for warning in realization.warnings],
             "outputs": {

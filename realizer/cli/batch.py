@@ -83,10 +83,12 @@ def batch(
     how = _options(formats, flags)
     from realizer.batch.run import DocumentsError, find
     from realizer.batch.run import batch as run
+    from realizer.outputs.registry import OUTPUTS
 
     with inputs.reporting(DocumentsError):
         lines = (list(filter(str.strip, sys.stdin.read().splitlines())) if p == "-" else [p] for p in places)
         documents = find(place for listed in lines for place in listed)
+    single = [suffix for suffix in formats if not OUTPUTS[suffix].all_characters]
     counts: Counter[str] = Counter()
     dropped = 0
     pool = _workers(how, min(workers or _core_count(), len(documents)), dask)
@@ -103,6 +105,13 @@ def batch(
                 dropped += bool(row.get("dropped"))
                 if row["status"] == "failed":
                     click.echo(f"{row['document']}: {row['error']}", err=True)
+                elif row["status"] == "refused":
+                    reason = next((w["text"] for w in row["warnings"]), "nothing to play")
+                    click.echo(f"{row['document']}: refused: {reason}", err=True)
+                first, *others = row.get("characters", [""])
+                if others and single:
+                    shows = f"{', '.join(single)} show {first}, not {', '.join(others)}"
+                    click.echo(f"{row['document']}: {shows}; see realize --character", err=True)
     finally:
         pool.close()
     parts = ", ".join(f"{counts[status]} {status}" for status in STATUS if counts[status])

@@ -47,6 +47,15 @@ def test_batch_exits_with_1_for_a_refused_document(talks: Path, tmp_path: Path) 
     done = batch("-", "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1", text=f"{talks}\n")
     assert done.return_value == 1
     assert rows(tmp_path / "out") == {"a": "done", "b": "done", "c": "refused"}
+    assert "c: refused: line 1" in done.stderr
+
+
+def test_batch_says_whom_formats_of_one_character_leave_out(talks: Path, tmp_path: Path) -> None:
+    both = (NOD.replace('<bml id="b"', f'<bml id="{name}" characterId="{name}"') for name in ("Ada", "Ben"))
+    (talks / "a.bml").write_text("".join(both))
+    command = [str(talks), "-o", str(tmp_path / "out"), "--workers", "1"]
+    assert "a: .fap show Ada, not Ben" in batch(*command, "--format", "fap", "--format", "json").stderr
+    assert "show" not in batch(*command, "--format", "json").stderr
 
 
 def test_batch_exits_with_1_for_a_dropped_behaviour_if_strict(talks: Path, tmp_path: Path) -> None:
