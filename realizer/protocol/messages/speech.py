@@ -55,7 +55,7 @@ class SpeechMessage(Message):
     )
 
     type: Literal["speech"]
-    id: str | None = Field(None, pattern=r"^[A-Za-z_][A-Za-z0-9_-]{0,63}$")
+    id: str | None = Field(None, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_-]{0,63}$")
     append: str | None = Field(None, max_length=MAX_APPEND, description="text with markup, as above")
     close: bool = Field(False, description="the end of the text: the rest is spoken, then the block ends")
     composition: Literal["MERGE", "APPEND", "REPLACE"] = Field(

@@ -135,6 +135,18 @@ def test_awaits_sync_ends_when_the_speech_is_closed() -> None:
     assert "turn:end" in at
 
 
+@pytest.mark.parametrize("id", ["3f2504e0-4f89-11d3-9a0c-0305e82c3301", "9", "1e5"])
+def test_speech_streams_take_an_id_that_begins_with_a_digit(id: str) -> None:
+    driver = Talker()
+    driver.send({"type": "speech", "id": id, "append": 'One <sync id="m"/>two. ', "close": True})
+    client = driver.send(f'<bml id="b"><head id="n" lexeme="NOD" stroke="{id}:{id}:m"/></bml>')
+    driver.run(4)
+    at = times(client)
+    assert not client.of("error")
+    assert at["b:n:stroke"] == pytest.approx(at[f"{id}.1:{id}:m"])
+    assert f"{id}:end" in at
+
+
 def test_speech_streams_suggest_a_sync_for_one_that_never_came() -> None:
     driver = Talker()
     driver.append('One <sync id="important"/>two. ')
