@@ -1,11 +1,21 @@
 """Checks of documents that find every fault of every block."""
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from bml_schema import Behaviour, Block, BMLError, ParameterValueChange, Problem, Required, read
+from bml_schema import (
+    Behaviour,
+    Block,
+    BMLError,
+    ParameterValueChange,
+    Problem,
+    Required,
+    WarningFeedback,
+    read,
+)
 from bml_schema.source import Source
 from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import VOCABULARY
@@ -46,6 +56,7 @@ def check_document(file: str, source: Source, text: bytes | str, player: Player)
         player: plays all blocks, so that blocks may refer to earlier ones.
     """
     voice = SilentVoice()
+    planned = set[str]()  # "block:behaviour"
     items = list(read(text, VOCABULARY, strict_bml=player.strict_bml)) or [NOTHING]
     for item, whole in zip(items, without_faults(source, items, player.strict_bml), strict=True):
         if isinstance(item, Block):
@@ -54,9 +65,15 @@ def check_document(file: str, source: Source, text: bytes | str, player: Player)
             if whole is not None:
                 context = replace(player.context, utterances=dict(utterances))
                 warnings += masked_faults(item, whole, player, context)
+            planned.update(f"{item.id}:{behaviour}" for behaviour in schedule.times)
             yield CheckedBlock(_explained(file, source, warnings), item, schedule, utterances)
         else:
             yield CheckedBlock(_explained(file, source, [parse_warning(item)]))
+    # Conflicts of blocks are settled when they start.
+    feedback = player.due(math.inf) if len(items) > 1 else []
+    warnings = [Warning(f.id, f.type, f.text) for f in feedback if isinstance(f, WarningFeedback)]
+    if later := [w for w in warnings if w.id in planned and w.type == "CANNOT_CREATE_BEHAVIOR"]:
+        yield CheckedBlock(_explained(file, source, later))
 
 
 def _explained(file: str, source: Source, warnings: list[Warning]) -> tuple[Finding, ...]:

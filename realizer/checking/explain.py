@@ -143,6 +143,8 @@ class _Sentences(FindingBuilder):
             self.labels.append(Label(self.source.name_spot(element), text))
             if held := _HELD.search(text):
                 self.holder(held[1], element)
+                if ":" in held[1]:
+                    self.notes.append('help: with composition="APPEND" the block waits for the other one')
             self.unknown_element(text, element, bool(meant))
             return text
         name, message = found[1], found[2]

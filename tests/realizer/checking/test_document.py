@@ -65,6 +65,16 @@ def test_check_document_finds_faults_of_changes_of_parameters(target, parameter,
     assert found == ([] if fault is None else [fault])
 
 
+def test_check_document_finds_conflicts_of_blocks_that_are_sent_together() -> None:
+    text = '<bml id="a"><speech id="s"><text>One.</text></speech></bml>'
+    text += '<bml id="b"><speech id="s"><text>Two.</text></speech></bml>'
+    (finding,) = findings(text)
+    assert finding.id == "b:s"
+    assert "wanted the voice" in finding.text
+    assert any('composition="APPEND"' in note for note in finding.notes)
+    assert not findings(text.replace('"b"', '"b" composition="APPEND"'))
+
+
 def test_check_document_has_findings_for_each_block() -> None:
     bad = '<bml id="b"><head id="n" lexeme="NIX"/></bml>'
     text = GOOD + "\n" + bad + '\n<bml id="c"><head'
