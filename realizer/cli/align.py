@@ -40,6 +40,8 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
     if text.startswith("@"):
         content = inputs.read_file(text[1:])
         text = inputs.decode(content, text[1:], "a text")
+    if not text.strip():
+        raise click.BadParameter("wanted the spoken words, got none", param_hint="TEXT")
     with inputs.reporting(RealizerError, f"{audio}: ", click.ClickException):
         recording = read_sound(audio.read_bytes())
     with waiting("aligning"):

@@ -44,7 +44,8 @@ class Annotation:
 
     def __post_init__(self) -> None:
         if not (0 <= self.start <= self.end < MAX_FRAMES and self.text):
-            raise ValueError(f"a text, a start and a later end in seconds are wanted, not {self}")
+            got = f"{self.text!r} from {self.start:g} to {self.end:g}"
+            raise ValueError(f"a text, a start and a later end in seconds are wanted, got {got}")
 
 
 @dataclass(frozen=True, slots=True)
