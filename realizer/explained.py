@@ -113,7 +113,7 @@ def _nodes(active: ActiveBlock) -> Iterator[str]:
     for node in block.behaviours:
         syncs = "".join(f' {name}="{ref}"' for name, ref in node.syncs.items())
         yield f"  {local(node.tag)} {node.id}{syncs}"
-    yield from (f"  dropped: {problem}" for problem in block.problems)
+    yield from (f"  {'dropped' if problem.dropped else 'warning'}: {problem}" for problem in block.problems)
 
 
 def _timings(active: ActiveBlock) -> Iterator[str]:
