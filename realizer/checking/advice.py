@@ -49,13 +49,16 @@ def advice(file: str, source: Source, block: Block, schedule: Schedule, player: 
         schedule: schedule of the block by `player`.
     """
     yield from _Advisor(file, source, block, block).attributes()
+    is_long = False  # whether there was advice on a long time: one document has all its times in one unit
     for node in block.behaviours:
         place = block.places.get(node.id)
         if place is not None:
             advisor = _Advisor(file, source, block, node, place.path, place.line)
             yield from advisor.attributes()
             yield from advisor.children()
-            yield from advisor.units()
+            for finding in () if is_long else advisor.units():
+                yield finding
+                is_long = True
             yield from advisor.target(player)
             if node.id in schedule.times:
                 yield from advisor.muscles(schedule, player)

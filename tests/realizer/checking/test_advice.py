@@ -56,6 +56,12 @@ def test_advice_is_given_on_times_in_another_unit(behaviour: str, head: str, hel
     assert finding.notes == (help,)
 
 
+def test_advice_on_long_times_is_given_once_for_a_block() -> None:
+    nods = "".join(f'<head id="n{k}" lexeme="NOD" start="{k}00"/>' for k in range(1, 9))
+    (finding,) = advised(f'<bml id="a">{nods}</bml>')
+    assert finding.id == "a:n3"
+
+
 def test_advice_is_given_on_a_misspelt_child_with_a_prefix() -> None:
     changes = (
         '<bmla:parametervaluechange id="n" target="b:s" paramId="volume" xmlns:bmla="http://www.asap-project.org/bmla">'
