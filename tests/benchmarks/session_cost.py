@@ -53,11 +53,12 @@ def new_session(number: int, ahead: float) -> Session:
 
 def tick(session: Session, now: float) -> float:
     """Do what the host does at a deadline. Return the next one."""
-    if (found := session.broadcast.frames_alone(now)) is not None:
-        return found[1]
-    session.tick(now)
+    due = session.due.send_alone(now)
+    if due is None:
+        session.tick(now, read_documents=False)
+        due = session.next_due()
     session.take_effects()
-    return session.next_due()
+    return due
 
 
 def play(session: Session, now: float) -> float:

@@ -240,15 +240,14 @@ class SessionRunner:
 
     def _send_due(self, session: Session, now: float) -> None:
         try:
-            frames = session.broadcast.frames_alone(now - session.clock.opened)
+            due = session.due.send_alone(session.clock.read(now))
         except Exception:
             self._fail(session)
             return
-        if frames is None:
+        if due is None:
             self._call(session, partial(self._work, session, now, read_documents=False))
             return
-        sends, due = frames
-        self._run(session, sends)
+        self._run(session, session.take_effects())
         for number in session.connections:
             client = self._clients.get(number)
             if client is not None and (waiting := client.unsent_bytes) > SLOW:

@@ -74,6 +74,25 @@ class DueWork:
     connections: Connections
     controls: ControlHandlers
     must_end_speech: bool = False  # with the next work, as a client has left, or sends no more of a clip
+    quiet_until: float = -math.inf  # until then nothing but feedback and frames is due
+    _next_frames: float = -math.inf  # when frames are due, unless the plan changes
+
+    def send_alone(self, t: float) -> float | None:
+        """Send the due feedback and frames, and return when something is due next; None for `work`.
+
+        This is the fast way for a session in which nothing else is due.
+        """
+        player, version = self.player, self.player.version
+        if t + EPSILON >= self.quiet_until:
+            return None
+        if player.next_change() <= t + EPSILON:
+            self.publish(t)
+            if player.version != version:
+                return None
+        if self._next_frames <= t + EPSILON:
+            self.connections.add_effects(self.broadcast.frames_due(t))
+            self._next_frames = self.broadcast.next_frame
+        return min(self.quiet_until, player.next_change(), self._next_frames)
 
     def work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document.
@@ -124,19 +143,21 @@ class DueWork:
     def next_time(self) -> float:
         """Return the time of the next event other than documents; infinity if there is none."""
         submission, streams = self.submission, self.broadcast
-        event, has_documents = self.player.next_event, self.has_documents
+        event, has_work = self.player.next_event, submission.has_work
         feedback = self.player.next_change()
-        if submission.has_work and (start := self.clock.start_of(event)) > event:
+        if has_work and (start := self.clock.start_of(event)) > event:
             feedback = start
-        other = min(feedback, submission.tts.deadline(), streams.next_other if streams.active else math.inf)
+        other = min(submission.tts.deadline(), streams.next_other)
+        has_documents = self.must_end_speech or has_work
         if not has_documents:
             other = min(other, submission.speeches.deadline())
         # Open speeches and slow clients are checked with every frame, schedules with all feedback: then
         # the deadline cannot be kept.
-        shown = streams.active and bool(streams.schedule_subscribers)
+        shown = bool(streams.schedule_subscribers)
         changes = has_documents or self.connections.has_slow or submission.speeches.open_ids or shown
-        streams.quiet_until = -math.inf if changes else other
-        return min(other, streams.next_frame if streams.active else math.inf)
+        self.quiet_until = -math.inf if changes else other
+        self._next_frames = streams.next_frame
+        return min(feedback, other, self._next_frames)
 
     def publish(self, t: float, *, starts: bool = True) -> None:
         """Number the feedback that is due and send it to its subscribers.

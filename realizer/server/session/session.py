@@ -166,7 +166,7 @@ class Session:
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
         if self.connections.update_backlog(connection, waiting):
-            self.broadcast.quiet_until = -math.inf
+            self.due.quiet_until = -math.inf
 
     # messages in --------------------------------------------------------------------------------
 

@@ -174,7 +174,6 @@ class Broadcast:
         self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
         self.active = False  # whether there is a subscription; without one nothing is ever due
-        self.quiet_until = -math.inf  # session clock; until then nothing but frames is due
         self.counts = Counter[str]()
         self.overload = Overload()
 
@@ -248,15 +247,6 @@ class Broadcast:
                     effects.append(Send(connection.id, message))
         effects += self.frames_due(now, is_reading=is_reading)
         self.video.due(self._video_subscribers, now, effects)
-
-    def frames_alone(self, now: float) -> tuple[list[Send], float] | None:
-        """Return the due frames, and when something is due next; None if more than frames may be due now.
-
-        This is the fast way for a session in which nothing but frames is due.
-        """
-        if now + EPSILON >= self.quiet_until:
-            return None
-        return self.frames_due(now), min(self.quiet_until, self.next_frame)
 
     def frames_due(self, now: float, *, is_reading: bool = False) -> list[Send]:
         """Return the due frames of the streams of numbers and of mesh.

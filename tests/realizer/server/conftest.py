@@ -123,18 +123,14 @@ class Driver:
 
     def wake(self) -> None:
         """As the shell does it."""
-        now = self.opened + self.now
-        found = None
+        due = None
         if not self.session.has_documents:
-            found = self.session.broadcast.frames_alone(now - self.opened)
-        if found is None:
+            due = self.session.due.send_alone(self.session.clock.read(self.opened + self.now))
+        if due is None:
             self.session.tick(self.opened + self.now)
-            self.collect()
         else:
-            effects, due = found
             assert due + self.opened == self.session.next_due()
-            for effect in effects:
-                self.do(effect)
+        self.collect()
 
     def collect(self) -> None:
         for effect in self.session.take_effects():
