@@ -15,7 +15,6 @@ from realizer.server.streams.frame_windows import (
     EPSILON,
     FrameSubscription,
     FrameTimeline,
-    FrameWindow,
     first_frame_at,
     last_frame_at,
 )
@@ -90,7 +89,8 @@ class Fanout:
         members: list[tuple[Connection, FrameSubscription]],
         overload: Overload,
     ) -> None:
-        timeline.limit_windows(s.stream for _, s in members)
+        self._subscriptions = [s for _, s in members]
+        timeline.limit_windows(s.stream for s in self._subscriptions)
         self.timeline = timeline
         self._overload = overload
         self.members = [(c, s) for c, s in members if not isinstance(s, AheadSubscription)]
@@ -125,7 +125,7 @@ class Fanout:
                 for number in range(s.next, newest + 1):
                     sends.append(Send(connection.id, window.message(s, number)))
             s.next = max(s.next, newest + 1)
-        self._drop_source(window)
+        window.drop_source(self._subscriptions)
 
     def send_ahead(self, newest: int, now: float, sends: list[Send], *, is_reading: bool) -> int:
         """Send what is due to the subscribers that get frames ahead. Return how many must take some back.
@@ -141,16 +141,14 @@ class Fanout:
                     continue
                 taken_back += s.take_back()
             is_slow = connection.is_slow
-            oldest = newest + 1 if is_slow else self._overload.oldest(newest, now, self.timeline.fps)
-            connection.dropped += s.drop_until(min(oldest, newest + 1))
+            if s.next <= newest:
+                oldest = self._overload.oldest(newest, now, self.timeline.fps)
+                connection.dropped += s.drop_until(newest + 1 if is_slow else oldest)
             if (message := s.message(newest, now, is_slow=is_slow)) is not None:
                 sends.append(Send(connection.id, message))
         if (window := self.timeline.latest_window) is not None:
-            self._drop_source(window)
+            window.drop_source(self._subscriptions)
         return taken_back
-
-    def _drop_source(self, window: FrameWindow) -> None:
-        window.drop_source(s for _, s in (*self.members, *self.ahead))
 
 
 class Broadcast:
