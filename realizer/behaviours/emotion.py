@@ -96,7 +96,7 @@ def check(node: Emotion | Mood, context: PlanningContext) -> tuple[Fault, ...]:
         )
     if node.name is not None:
         try:
-            profile_of(node.name, profiles)
+            (place_of if profiles == "own" else profile_of)(node.name, profiles)
         except UnknownWordError as wrong:
             if node.name[-1:].isdecimal():
                 return (Fault("CANNOT_CREATE_BEHAVIOR", str(wrong).replace("emotion: ", "name: ", 1)),)

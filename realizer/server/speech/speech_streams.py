@@ -168,7 +168,7 @@ class SpeechStreams:
             cut = [self._speeches[id].open_chunks for id in block.interrupt if id in self._speeches]
             if cut:
                 block = replace(block, interrupt=tuple(dict.fromkeys(chain(block.interrupt, *cut))))
-            has_syncs = any(map(self._is_speech_sync, references(block)))
+            has_syncs = bool(self._speeches) and any(map(self._is_speech_sync, references(block)))
             return with_references(block, self._chunk_reference) if has_syncs else block
         own = self._player.blocks.find(speech.id)
         waits = own.dependencies if own is not None and own.is_waiting else ()
@@ -189,7 +189,7 @@ class SpeechStreams:
 
     def awaited_syncs(self, block: Block) -> list[str]:
         """Return the references of a block to syncs of speeches that may still arrive."""
-        named = filter(self._is_speech_sync, references(block))
+        named = filter(self._is_speech_sync, references(block) if self._speeches else ())
         awaited = (ref for ref in named if self._speeches[ref.block or ""].awaits_sync(ref.sync or ""))
         return [f"{ref.block}:{ref.behaviour}:{ref.point}" for ref in awaited]
 
