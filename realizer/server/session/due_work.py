@@ -75,24 +75,27 @@ class DueWork:
     controls: ControlHandlers
     must_end_speech: bool = False  # with the next work, as a client has left, or sends no more of a clip
     quiet_until: float = -math.inf  # until then nothing but feedback and frames is due
-    _next_frames: float = -math.inf  # when frames are due, unless the plan changes
+    # when feedback and frames are due, as of the last `next_time` or `send_alone`
+    _next_feedback: float = -math.inf
+    _next_frames: float = -math.inf
 
     def send_alone(self, t: float) -> float | None:
         """Send the due feedback and frames, and return when something is due next; None for `work`.
 
         This is the fast way for a session in which nothing else is due.
         """
-        player, version = self.player, self.player.version
         if t + EPSILON >= self.quiet_until:
             return None
-        if player.next_change() <= t + EPSILON:
+        if self._next_feedback <= t + EPSILON:
+            version = self.player.version
             self.publish(t)
-            if player.version != version:
+            if self.player.version != version:
                 return None
+            self._next_feedback = self.player.next_change()
         if self._next_frames <= t + EPSILON:
             self.connections.add_effects(self.broadcast.frames_due(t))
             self._next_frames = self.broadcast.next_frame
-        return min(self.quiet_until, player.next_change(), self._next_frames)
+        return min(self.quiet_until, self._next_feedback, self._next_frames)
 
     def work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document.
@@ -144,9 +147,9 @@ class DueWork:
         """Return the time of the next event other than documents; infinity if there is none."""
         submission, streams = self.submission, self.broadcast
         event, has_work = self.player.next_event, submission.has_work
-        feedback = self.player.next_change()
+        self._next_feedback = self.player.next_change()
         if has_work and (start := self.clock.start_of(event)) > event:
-            feedback = start
+            self._next_feedback = start
         other = min(submission.tts.deadline(), streams.next_other)
         has_documents = self.must_end_speech or has_work
         if not has_documents:
@@ -157,7 +160,7 @@ class DueWork:
         changes = has_documents or self.connections.has_slow or submission.speeches.open_ids or shown
         self.quiet_until = -math.inf if changes else other
         self._next_frames = streams.next_frame
-        return min(feedback, other, self._next_frames)
+        return min(self._next_feedback, other, self._next_frames)
 
     def publish(self, t: float, *, starts: bool = True) -> None:
         """Number the feedback that is due and send it to its subscribers.
