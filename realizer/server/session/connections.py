@@ -219,11 +219,6 @@ class Connections(dict[int, Connection]):
         """Whether one of them is slow."""
         return any(connection.is_slow for connection in self.values())
 
-    @property
-    def has_subscriptions(self) -> bool:
-        """Whether one of them has a subscription to a stream."""
-        return any(connection.subscriptions for connection in self.values())
-
     def update_backlog(self, id: int, waiting: int) -> bool:
         """Take the number of unsent bytes of a client: a slow one misses frames, a stuck one is closed.
 

@@ -108,11 +108,10 @@ class DueWork:
         """
         self.must_end_speech = bool(self.submission.speeches.overdue(t))
         self.publish(t, starts=starts)
-        if self.broadcast.active or self.connections.has_subscriptions:
-            self.broadcast.set_subscribers(self.connections.values())
-            effects: list[Effect] = []
-            self.broadcast.send_due(t, effects, is_reading=read_documents and self.submission.has_work)
-            self.connections.add_effects(effects)
+        self.broadcast.set_subscribers(self.connections.values())
+        effects: list[Effect] = []
+        self.broadcast.send_due(t, effects, is_reading=read_documents and self.submission.has_work)
+        self.connections.add_effects(effects)
         if self.submission.pending.blocks:
             self.connections.add_effects(self.submission.tts.expire(t + EPSILON))
         # A tick reads or plans, not both: so the acknowledgement is sent before planning begins, and due
@@ -175,7 +174,7 @@ class DueWork:
             self.clock.hold()
             if t <= self.player.next_event <= t + EPSILON:
                 self.clock.end_instant(self.player.next_event)
-        if self.broadcast.active and (change := self.player.next_event) <= t + EPSILON:
+        if (change := self.player.next_event) <= t + EPSILON:
             self.broadcast.settle(change)
         texts: list[str] = []
         while due := self.player.due(t + EPSILON, math.inf if starts else t):
@@ -193,5 +192,4 @@ class DueWork:
         A replay of the journal has no wake-ups in between and must publish the same.
         """
         self.publish(t, starts=False)
-        if self.broadcast.active:
-            self.connections.add_effects(self.broadcast.frames_due(t, is_reading=True))
+        self.connections.add_effects(self.broadcast.frames_due(t, is_reading=True))

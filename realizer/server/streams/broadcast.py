@@ -171,7 +171,6 @@ class Broadcast:
         self._audio_subscribers: list[tuple[Connection, AudioSubscription]] = []
         self.schedule_subscribers: list[tuple[Connection, ScheduleSubscription]] = []
         self._video_subscribers: list[VideoSubscription] = []
-        self.active = False  # whether there is a subscription; without one nothing is ever due
         self.counts = Counter[str]()
         self.overload = Overload()
 
@@ -193,7 +192,6 @@ class Broadcast:
         self, index: int, fps: float, options: RenderOptions, now: float
     ) -> VideoSubscription:
         """Return a subscription to pictures from `now` on."""
-        self.active = True  # so that `send_due` runs and removes the view if the subscription is refused
         return self.video.subscription(self.timeline(index, fps), index, options, now)
 
     def face_changed(self, index: int) -> list[tuple[int, FrameSubscription]]:
@@ -224,9 +222,6 @@ class Broadcast:
                 else:
                     self._video_subscribers.append(s)
         self._fanouts = [Fanout(timeline, members, self.overload) for timeline, members in frames.items()]
-        self.active = bool(
-            frames or self.schedule_subscribers or self._audio_subscribers or self._video_subscribers
-        )
 
     def settle(self, t: float) -> None:
         """Keep the frames before `t` that were sent ahead, since the plan will change at that time."""
