@@ -64,6 +64,21 @@ def test_tick_sends_frames_while_documents_wait(driver) -> None:
     assert {"b0:end", "b1:end", "b2:start"} <= set(driver.clients[1].ids)
 
 
+def test_send_alone_sends_feedback_and_frames_until_a_document_comes(driver) -> None:
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 25, "ahead": 0.2})
+    client = driver.send(NOD.format("b"))
+    driver.run(0.1)
+    known, frames, due = len(client.ids), len(client.frames), 0.1
+    while due < 2.0:
+        due = driver.session.due.send_alone(due)
+        driver.collect()
+    assert {"b:n:stroke", "b:end"} <= set(client.ids[known:])
+    assert len(client.frames) > frames + 10
+    driver.session.receive(1, NOD.format("c"), driver.opened + 2.0)
+    assert driver.session.next_due() > driver.opened + 2.0
+    assert driver.session.due.send_alone(2.0) is None
+
+
 def test_read_returns_seconds_since_the_session_opened() -> None:
     clock = SessionClock(100.0)
     assert [clock.read(now) for now in (100.0, 100.5, 103.0)] == [0.0, 0.5, 3.0]
