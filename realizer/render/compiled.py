@@ -14,6 +14,7 @@ NO_NUMBA = "pictures without OpenGL need the render extra: pip install 'bml-real
 OPTIONS: Any = {
     "nogil": True,
     "_nrt": False,
+    "forceinline": True,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
 }

@@ -7,160 +7,84 @@ import numpy as np
 
 from realizer.face.drawn_mesh import EYE, HAIR
 from realizer.render.compiled import compiled
-from realizer.render.lamp_view import ASIDE, NEAR, SIDE, SOFT
-from realizer.render.shading import BRIGHTEST, STEPS, dot, reflected, unit
+from realizer.render.shading import BRIGHTEST, STEPS, dot, mirrored, reflected, unit
+from realizer.render.shadows import reach
 from realizer.render.surfaces import BENT, BOWL
 from realizer.render.textures import CHANNELS, DEPTH, FOLD_SHADE, IRIS, STEEPEST
 from realizer.render.visibility import SAMPLES, level_of
 
-
-@compiled
-def reach(shadows: Any, place: Any, normal: Any) -> Any:
-    """Return the share of the lamp that a place with that normal sees.
-
-    Args:
-        shadows: depths (SIDE, SIDE, k) of the samples of each texel, and the lamp's matrix.
-    """
-    depths, matrix = shadows
-    x, y, z = place
-    metre = np.float32(math.sqrt(matrix[2, 0] ** 2 + matrix[2, 1] ** 2 + matrix[2, 2] ** 2))
-    facing = -(matrix[2, 0] * normal[0] + matrix[2, 1] * normal[1] + matrix[2, 2] * normal[2]) / metre
-    # The more a surface is turned away, the more depth it has within the texels around.
-    aside = np.float32(math.sqrt(max(np.float32(1) - facing * facing, np.float32(0))))
-    near = np.float32(NEAR) + np.float32(ASIDE) * aside / max(facing, np.float32(0.2))
-    u = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2] * z + matrix[0, 3]
-    v = matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2] * z + matrix[1, 3]
-    depth = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2] * z + matrix[2, 3] - near * metre
-    least, most = np.float32(1), np.float32(SIDE - 2)
-    i, j = int(min(max(u, least), most)), int(min(max(v, least), most))
-    s, t = u - np.float32(i), v - np.float32(j)
-    soft = np.float32(1) / (np.float32(SOFT) * metre)
-    seen = np.float32(0)
-    for row in range(-1, 2):
-        wy = _share(row, t)
-        for column in range(-1, 2):
-            count = np.float32(0)
-            for k in range(depths.shape[2]):
-                count += min(max((depths[j + row, i + column, k] - depth) * soft + np.float32(1), 0), 1)
-            seen += wy * _share(column, s) * count
-    return seen / np.float32(depths.shape[2])
-
-
-@compiled
-def _share(step: Any, at: Any) -> Any:
-    """Return the weight of the texel `step` away (-1, 0, 1) from one in which `at` 0..1 is the place."""
-    f = min(max(at, np.float32(0)), np.float32(1)) - np.float32(0.5)
-    if step == 0:
-        return np.float32(0.75) - f * f
-    near = np.float32(0.5) + np.float32(step) * f
-    return np.float32(0.5) * near * near
-
-
 # Samples of one kind are lit once where their nearness differs by less than this share, and the green of
 # their triangles' colours by less than that.
 SAME, TINT = np.float32(8e-4), np.float32(0.05)
+SETUPS = 512  # triangles whose setup a thread keeps
+# Columns of a setup: what is fixed and what moves at the first corner, and the steps to the two others; the
+# directions in which u and v grow, with the scale; place in the picture, and changes to the right and down.
+FIXED, MOVING, ONE, OTHER, ALONG, DOWN, SCALE, CORNER, CHANGES, SETUP = 0, 7, 17, 34, 51, 54, 57, 58, 60, 64
+# Rows of points that are lit together. The light replaces the place, the direction that is mirrored and its
+# share replace the normal and the first of the strand.
+ROOM, PLACE, NORMAL, STRAND, SLOPE, ALBEDO, VALUES, ROWS = 256, 0, 3, 6, 9, 12, 15, 19
+TOGETHER = 16  # points are lit in multiples of this, so that none is left over
 
 
 @compiled
 def _texel(texels: Any, level: Any, u: Any, v: Any, out: Any) -> None:
     """Write the maps' values at a place, (CHANNELS,) 0..255, between the four texels around it."""
     values, levels = texels
-    first, wide, tall = levels[level]
-    x, y = u * wide - np.float32(0.5), v * tall - np.float32(0.5)
+    first, wide, tall = levels[level, 0], levels[level, 1], levels[level, 2]
+    x, y = u * np.float32(wide) - np.float32(0.5), v * np.float32(tall) - np.float32(0.5)
     left, upper = math.floor(x), math.floor(y)
-    fx, fy = np.float32(x - left), np.float32(y - upper)
+    fx, fy = x - np.float32(left), y - np.float32(upper)
     x0, x1 = min(max(left, 0), wide - 1), min(max(left + 1, 0), wide - 1)
     y0, y1 = first + min(max(upper, 0), tall - 1) * wide, first + min(max(upper + 1, 0), tall - 1) * wide
     one = np.float32(1)
     w00, w10, w01, w11 = (one - fx) * (one - fy), fx * (one - fy), (one - fx) * fy, fx * fy
     for k in range(CHANNELS):
         out[k] = (
-            w00 * values[y0 + x0, k] + w10 * values[y0 + x1, k]
-            + w01 * values[y1 + x0, k] + w11 * values[y1 + x1, k]
+            w00 * np.float32(values[y0 + x0, k]) + w10 * np.float32(values[y0 + x1, k])
+            + w01 * np.float32(values[y1 + x0, k]) + w11 * np.float32(values[y1 + x1, k])
         )  # fmt: skip
 
 
 @compiled
-def _light_of(t: Any, x: Any, y: Any, points: Any, moving: Any, mesh: Any, texels: Any, view: Any) -> Any:
-    """Return the light (r, g, b) of a triangle's point at pixel (x, y)."""
-    triangles, fixed, kinds, rows, linear, _ = mesh
-    half = np.float32(0.5)
-    lights, (eye, shadows), texel = view
+def _set_up(t: Any, points: Any, moving: Any, mesh: Any, levels: Any, setup: Any, numbers: Any) -> None:
+    """Write the setup of a triangle; and its number, the level of the maps, and whether it is the back."""
+    triangles, fixed = mesh[0], mesh[1]
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     vx, vy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     turn = ux * vy - vx * uy
-    dx, dy = x - points[a, 0], y - points[a, 1]
-    s, r = np.float32((dx * vy - dy * vx) / turn), np.float32((dy * ux - dx * uy) / turn)
-    q = np.float32(1) - s - r
-    u, v = (
-        q * fixed[a, 0] + s * fixed[b, 0] + r * fixed[c, 0],
-        q * fixed[a, 1] + s * fixed[b, 1] + r * fixed[c, 1],
-    )
-    level, kind, byte = level_of(fixed, texels[1], (a, b, c), turn), kinds[a], np.float32(1 / 255)
-    _texel(texels, level, u, v, texel)
-    place = _mixed(moving, 0, a, b, c, (q, s, r))
-    smooth = unit(_mixed(moving, 3, a, b, c, (q, s, r)))
-    towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
-    # Hairs have the normals of the head that they grow on, whichever way their card is seen.
-    if dot(smooth, towards) < 0 and turn > 0 and kind != HAIR:
-        smooth = (-smooth[0], -smooth[1], -smooth[2])
-    along, down, size = _frame(fixed, moving, (a, b, c))
-    if kind == HAIR:
-        down = unit(_mixed(moving, 7, a, b, c, (q, s, r)))
-    su = sv = np.float32(0)
-    if kind == EYE and texel[8] < 254:
-        depth = np.float32(DEPTH) * (np.float32(1) - texel[8] * byte)
-        dive = size * _dive(depth, smooth, towards)
-        u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
-        _texel(texels, level, u, v, texel)
-        bowl = np.float32(BOWL / IRIS[2]) * min(depth / np.float32(0.0004), np.float32(1))
-        su, sv = bowl * (u - np.float32(IRIS[0])), bowl * (v - np.float32(IRIS[1]))
-    albedo = (
-        linear[int(texel[0] + half)] * (q * fixed[a, 2] + s * fixed[b, 2] + r * fixed[c, 2]),
-        linear[int(texel[1] + half)] * (q * fixed[a, 3] + s * fixed[b, 3] + r * fixed[c, 3]),
-        linear[int(texel[2] + half)] * (q * fixed[a, 4] + s * fixed[b, 4] + r * fixed[c, 4]),
-    )
-    fold = q * moving[a, 6] + s * moving[b, 6] + r * moving[c, 6]
-    scale = np.float32(STEEPEST / 127)
-    su += (texel[4] - 128 + (texel[9] - 128) * fold) * scale
-    sv += (texel[5] - 128 + (texel[10] - 128) * fold) * scale
-    relief = unit((
-        smooth[0] - su * along[0] - sv * down[0],
-        smooth[1] - su * along[1] - sv * down[1],
-        smooth[2] - su * along[2] - sv * down[2],
-    ))  # fmt: skip
-    occlusion = (q * fixed[a, 5] + s * fixed[b, 5] + r * fixed[c, 5]) * texel[6] * byte
-    occlusion *= np.float32(1) - np.float32(FOLD_SHADE) * fold * texel[11] * byte
-    rough = max((q * fixed[a, 6] + s * fixed[b, 6] + r * fixed[c, 6]) * texel[7] * byte, np.float32(0.06))
-    values = (occlusion, rough, texel[8] * byte, reach(shadows, place, smooth))
-    return reflected(rows[kind], kind == HAIR, albedo, (relief, smooth, down), values, towards, lights)
+    for k in range(MOVING):
+        setup[k] = fixed[a, k]
+        setup[ONE + k], setup[OTHER + k] = fixed[b, k] - fixed[a, k], fixed[c, k] - fixed[a, k]
+    for k in range(ONE - MOVING):
+        at = MOVING + k
+        setup[at] = moving[a, k]
+        setup[ONE + at], setup[OTHER + at] = moving[b, k] - moving[a, k], moving[c, k] - moving[a, k]
+    along, down, scale = _frame(setup)
+    for k in range(3):
+        setup[ALONG + k], setup[DOWN + k] = along[k], down[k]
+    setup[SCALE], setup[CORNER], setup[CORNER + 1] = scale, points[a, 0], points[a, 1]
+    setup[CHANGES], setup[CHANGES + 1] = vy / turn, vx / turn
+    setup[CHANGES + 2], setup[CHANGES + 3] = uy / turn, ux / turn
+    numbers[0], numbers[1], numbers[2] = t, level_of(fixed, levels, (a, b, c), turn), turn > 0
 
 
 @compiled
-def _mixed(rows: Any, k: Any, a: Any, b: Any, c: Any, shares: Any) -> Any:
-    """Return the mixture of three vertices' vectors in columns k to k + 2."""
-    q, s, r = shares
-    return (
-        q * rows[a, k] + s * rows[b, k] + r * rows[c, k],
-        q * rows[a, k + 1] + s * rows[b, k + 1] + r * rows[c, k + 1],
-        q * rows[a, k + 2] + s * rows[b, k + 2] + r * rows[c, k + 2],
-    )
+def _vector(values: Any, k: Any) -> Any:
+    """Return three values from `k` on."""
+    return values[k], values[k + 1], values[k + 2]
 
 
 @compiled
-def _frame(fixed: Any, moving: Any, corners: Any) -> Any:
+def _frame(setup: Any) -> Any:
     """Return the unit vectors on a triangle along which u and v of the maps grow, and their scale, 1/m."""
-    a, b, c = corners
-    e = (moving[b, 0] - moving[a, 0], moving[b, 1] - moving[a, 1], moving[b, 2] - moving[a, 2])
-    f = (moving[c, 0] - moving[a, 0], moving[c, 1] - moving[a, 1], moving[c, 2] - moving[a, 2])
-    u, v = fixed[b, 0] - fixed[a, 0], fixed[b, 1] - fixed[a, 1]
-    s, t = fixed[c, 0] - fixed[a, 0], fixed[c, 1] - fixed[a, 1]
+    e, f = _vector(setup, ONE + MOVING), _vector(setup, OTHER + MOVING)
+    u, v, s, t = setup[ONE], setup[ONE + 1], setup[OTHER], setup[OTHER + 1]
     way = np.float32(1) if u * t - v * s > 0 else np.float32(-1)
     along = unit(((t * e[0] - v * f[0]) * way, (t * e[1] - v * f[1]) * way, (t * e[2] - v * f[2]) * way))
     down = unit(((u * f[0] - s * e[0]) * way, (u * f[1] - s * e[1]) * way, (u * f[2] - s * e[2]) * way))
     ef = (e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0])
-    size = math.sqrt(abs(u * t - v * s) / math.sqrt(max(dot(ef, ef), 1e-30)))
+    size = math.sqrt(abs(u * t - v * s) / math.sqrt(max(dot(ef, ef), np.float32(1e-30))))
     return along, down, np.float32(size)
 
 
@@ -173,20 +97,121 @@ def _dive(depth: Any, n: Any, towards: Any) -> Any:
 
 
 @compiled
+def _point(
+    setup: Any, numbers: Any, kind: Any, x: Any, y: Any, texels: Any, eye: Any, shadows: Any, linear: Any,
+    out: Any, i: Any, room: Any,
+) -> None:  # fmt: skip
+    """Write point `i` of those that are lit together: that of a triangle at pixel (x, y)."""
+    values, texel = room
+    one, byte, half, zero_slope = np.float32(1), np.float32(1 / 255), np.float32(0.5), np.float32(128)
+    dx, dy = x - setup[CORNER], y - setup[CORNER + 1]
+    s = dx * setup[CHANGES] - dy * setup[CHANGES + 1]
+    r = dy * setup[CHANGES + 3] - dx * setup[CHANGES + 2]
+    for k in range(ONE):
+        values[k] = setup[k] + s * setup[ONE + k] + r * setup[OTHER + k]
+    u, v = values[0], values[1]
+    _texel(texels, numbers[1], u, v, texel)
+    place, smooth, fold = _vector(values, MOVING), unit(_vector(values, MOVING + 3)), values[MOVING + 6]
+    su = sv = np.float32(0)
+    along, down = _vector(setup, ALONG), _vector(setup, DOWN)
+    if numbers[2] or kind == EYE:
+        towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
+        # Hairs have the normals of the head that they grow on, whichever way their card is seen.
+        if dot(smooth, towards) < 0 and numbers[2] and kind != HAIR:
+            smooth = (-smooth[0], -smooth[1], -smooth[2])
+        if kind == EYE and texel[8] < 254:
+            depth = np.float32(DEPTH) * (one - texel[8] * byte)
+            dive = setup[SCALE] * _dive(depth, smooth, towards)
+            u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
+            _texel(texels, numbers[1], u, v, texel)
+            bowl = np.float32(BOWL / IRIS[2]) * min(depth / np.float32(0.0004), one)
+            su, sv = bowl * (u - np.float32(IRIS[0])), bowl * (v - np.float32(IRIS[1]))
+    scale = np.float32(STEEPEST / 127)
+    su += (texel[4] - zero_slope + (texel[9] - zero_slope) * fold) * scale
+    sv += (texel[5] - zero_slope + (texel[10] - zero_slope) * fold) * scale
+    for k in range(3):
+        out[(PLACE + k) * ROOM + i] = place[k]
+        out[(NORMAL + k) * ROOM + i] = smooth[k]
+        out[(STRAND + k) * ROOM + i] = values[MOVING + 7 + k]
+        out[(SLOPE + k) * ROOM + i] = su * along[k] + sv * down[k]
+        out[(ALBEDO + k) * ROOM + i] = linear[int(texel[k] + half)] * values[2 + k]
+    occlusion = values[5] * texel[6] * byte * (one - np.float32(FOLD_SHADE) * fold * texel[11] * byte)
+    out[VALUES * ROOM + i] = occlusion
+    out[(VALUES + 1) * ROOM + i] = max(values[6] * texel[7] * byte, np.float32(0.06))
+    out[(VALUES + 2) * ROOM + i] = texel[8] * byte
+    out[(VALUES + 3) * ROOM + i] = reach(shadows, place, smooth)
+
+
+@compiled
+def _row(points: Any, k: Any, i: Any) -> Any:
+    """Return the vector of point `i` in rows `k` to `k` + 2."""
+    return points[k * ROOM + i], points[(k + 1) * ROOM + i], points[(k + 2) * ROOM + i]
+
+
+@compiled
+def _lit(points: Any, count: Any, surface: Any, hair: Any, coat: Any, lights: Any, eye: Any) -> None:
+    """Replace the places of points of one kind by their light, and what follows by what they mirror."""
+    for i in range(count):
+        place, smooth, slope = _row(points, PLACE, i), _row(points, NORMAL, i), _row(points, SLOPE, i)
+        towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
+        relief = unit((smooth[0] - slope[0], smooth[1] - slope[1], smooth[2] - slope[2]))
+        normals = relief, smooth, _row(points, STRAND, i)
+        values = (*_row(points, VALUES, i), points[(VALUES + 3) * ROOM + i])
+        albedo = _row(points, ALBEDO, i)
+        light, mirrored, share = reflected(surface, hair, coat, albedo, normals, values, towards, lights)
+        points[i], points[ROOM + i], points[2 * ROOM + i] = light
+        points[3 * ROOM + i], points[4 * ROOM + i], points[5 * ROOM + i] = mirrored
+        points[STRAND * ROOM + i] = share
+
+
+@compiled
+def _add(kind: Any, count: Any, points: Any, into: Any, mesh: Any, lights: Any, eye: Any) -> None:
+    """Light points of one kind, and add their colours to the pixels of a row."""
+    lamps, levels = lights
+    columns, weights, sums = into
+    curve, surface = mesh[5], mesh[3][kind]
+    full = (count + TOGETHER - 1) // TOGETHER * TOGETHER
+    if kind == HAIR:
+        _lit(points, full, surface, True, False, lamps, eye)
+    elif kind == EYE:
+        _lit(points, full, surface, False, True, lamps, eye)
+    else:
+        _lit(points, full, surface, False, False, lamps, eye)
+    zero, one, bright, to_step = (
+        np.float32(0),
+        np.float32(1),
+        np.float32(1 / BRIGHTEST),
+        np.float32(STEPS - 1),
+    )
+    for i in range(count):
+        light, share = _row(points, PLACE, i), points[STRAND * ROOM + i]
+        if share > zero:
+            sky = mirrored(levels, _row(points, NORMAL, i), points[(VALUES + 1) * ROOM + i])
+            light = light[0] + share * sky[0], light[1] + share * sky[1], light[2] + share * sky[2]
+        for k in range(3):
+            step = np.float32(math.sqrt(min(max(light[k] * bright, zero), one))) * to_step
+            sums[columns[i], k] += weights[i] * curve[int(step)]
+        sums[columns[i], 3] += weights[i]
+
+
+@compiled
 def light_band(
     points: Any, moving: Any, mesh: Any, texels: Any, lights: Any, eye: Any, rows: Any, pictures: Any
 ) -> None:
     """Write the pixels of a band of rows, and clear its samples."""
-    keys, picture, (found, _), (near, texel) = pictures
-    triangles, fixed, kinds, curve = mesh[0], mesh[1], mesh[2], mesh[5]
-    view = lights, eye, texel
+    keys, picture, room = pictures
+    (found, numbers, counts, columns), (near, values, texel, setups, lit, weights, sums) = room
+    triangles, fixed, kinds, linear = mesh[0], mesh[1], mesh[2], mesh[4]
+    place, shadows = eye
     per = len(SAMPLES)
     nothing, low_half, high_half = np.uint64(0), np.uint64(0xFFFFFFFF), np.uint64(32)
-    to_step = np.float32(STEPS - 1)
+    numbers[:, 0] = -1
+    counts[:] = 0
     for y in range(rows[0], rows[1]):
+        sums[:] = 0
         for x in range(keys.shape[1]):
-            red = green = blue = np.float32(0)
-            count = 0
+            if keys[y, x, 0] | keys[y, x, 1] | keys[y, x, 2] | keys[y, x, 3] == nothing:
+                continue
             for k in range(per):
                 key = keys[y, x, k]
                 found[k] = np.int64(key & low_half) - 1
@@ -211,13 +236,26 @@ def light_band(
                         continue
                     weight += 1
                     found[j] = -1
-                light = _light_of(t, x + sx / inside, y + sy / inside, points, moving, mesh, texels, view)
-                count += weight
-                red += weight * curve[int(math.sqrt(min(max(light[0] / BRIGHTEST, 0), 1)) * to_step)]
-                green += weight * curve[int(math.sqrt(min(max(light[1] / BRIGHTEST, 0), 1)) * to_step)]
-                blue += weight * curve[int(math.sqrt(min(max(light[2] / BRIGHTEST, 0), 1)) * to_step)]
-            part, half = np.float32(1 / per), np.float32(0.5)
-            picture[y, x, 0] = np.uint8(red * part + half)
-            picture[y, x, 1] = np.uint8(green * part + half)
-            picture[y, x, 2] = np.uint8(blue * part + half)
-            picture[y, x, 3] = np.uint8(255 * count / per + half)
+                slot, i = t % SETUPS, counts[kind]
+                if numbers[slot, 0] != t:
+                    _set_up(t, points, moving, mesh, texels[1], setups[slot], numbers[slot])
+                px, py = np.float32(x + sx / inside), np.float32(y + sy / inside)
+                _point(
+                    setups[slot], numbers[slot], kind, px, py, texels, place, shadows, linear,
+                    lit[kind], i, (values, texel),
+                )  # fmt: skip
+                columns[kind, i], weights[kind, i] = x, weight
+                counts[kind] = i + 1
+                if i + 1 == ROOM:
+                    _add(kind, ROOM, lit[kind], (columns[kind], weights[kind], sums), mesh, lights, place)
+                    counts[kind] = 0
+        for kind in range(len(counts)):
+            if counts[kind]:
+                into = columns[kind], weights[kind], sums
+                _add(kind, counts[kind], lit[kind], into, mesh, lights, place)
+                counts[kind] = 0
+        part, half = np.float32(1 / per), np.float32(0.5)
+        for x in range(keys.shape[1]):
+            for k in range(3):
+                picture[y, x, k] = np.uint8(sums[x, k] * part + half)
+            picture[y, x, 3] = np.uint8(sums[x, 3] * np.float32(255 / per) + half)

@@ -13,8 +13,9 @@ from realizer.face.drawn_mesh import DrawnMesh
 from realizer.render.canvas import Canvas
 from realizer.render.lamp_view import SIDE, LampView
 from realizer.render.light import Light, unit
-from realizer.render.lighting import light_band
+from realizer.render.lighting import ROOM, ROWS, SETUP, SETUPS, light_band
 from realizer.render.shading import tone_curve
+from realizer.render.shadows import AWAY, depths_of, ends_around
 from realizer.render.surfaces import mirrored_of, surfaces
 from realizer.render.textures import CHANNELS, Texels
 from realizer.render.visibility import SAMPLES, fill
@@ -46,14 +47,17 @@ class Raster:
         self._texels = texels.values, texels.levels
         self._sides = mesh.two_sided.astype(np.uint8) | mesh.see_through.astype(np.uint8) << 1
         fixed = np.column_stack([mesh.uv, colours, mesh.occlusion, mesh.roughness]).astype(np.float32)
+        rows = tuple(map(tuple, surfaces()))
         to_linear = linear(np.arange(256, dtype=np.uint8))
-        self._mesh = mesh.triangles, fixed, mesh.kind, surfaces(), to_linear, tone_curve()
+        self._mesh = mesh.triangles, fixed, mesh.kind, rows, to_linear, tone_curve()
         # Each thread draws a band of rows; the loops release Python's lock.
         bands = max(1, min(MAX_THREADS, os.cpu_count() or 1, height))
         self._bands = _bands(height, 4 * bands)
         self._pool = ThreadPoolExecutor(bands)
         self._lamp = lamp
         self._samples = np.zeros((SIDE, SIDE, len(SAMPLES)), np.uint64)
+        self._depths = np.empty(self._samples.shape, np.float32)
+        self._ends = np.empty((2, SIDE, SIDE, 2), np.float32)
         self._shadow_bands = _bands(SIDE, 2 * bands)
 
     def __call__(self, points: Any, nearness: Float32, moving: Float32, lights: Any, eye: Float32) -> UInt8:
@@ -64,33 +68,34 @@ class Raster:
             nearness: (d,) 1 / distance, which is linear in the picture.
             moving: (d, 10) place and unit normal in metres, how much of the folds shows, and the direction
                 of hairs.
-            lights: as `shading.reflected` takes them.
+            lights: as `shading.reflected` takes them, and the maps of the environment that is mirrored.
             eye: (3,) place of the camera in metres.
         """
         points = np.ascontiguousarray(points, np.float64)
         nearness = np.ascontiguousarray(nearness, np.float32)
-        shadows = self._shadow_map(moving), self._lamp.matrix
+        shadows = *self._shadow_map(moving), self._lamp.matrix
 
         def band(rows: tuple[int, int]) -> None:
             self._see(points, nearness, rows, self._keys)
-            pictures = self._keys, self._picture, *_room()
+            pictures = self._keys, self._picture, _room_for_light(self._picture.shape[1])
             light_band(points, moving, self._mesh, self._texels, lights, (eye, shadows), rows, pictures)
 
         list(self._pool.map(band, self._bands))
         return self._picture
 
-    def _shadow_map(self, moving: Float32) -> Float32:
+    def _shadow_map(self, moving: Float32) -> tuple[Float32, Float32]:
+        """Return the depths that the lamp sees and their ends around, as `reach` takes them."""
         points = self._lamp.project(moving[:, :3])
-        # The nearer to the lamp, the greater; never 0.
-        nearness = (1.5 - points[:, 2]).astype(np.float32)
+        nearness = (AWAY - points[:, 2]).astype(np.float32)
+        ends, around = self._ends
 
         def band(rows: tuple[int, int]) -> None:
-            self._samples[slice(*rows)] = 0
             self._see(points, nearness, rows, self._samples)
+            depths_of(self._samples, rows, self._depths, ends)
 
         list(self._pool.map(band, self._shadow_bands))
-        near = (self._samples >> np.uint64(32)).astype(np.uint32).view(np.float32)
-        return np.where(near > 0, np.float32(1.5) - near, np.float32(2))
+        list(self._pool.map(lambda rows: ends_around(ends, rows, around), self._shadow_bands))
+        return self._depths, around
 
     def _see(self, points: Any, nearness: Float32, rows: tuple[int, int], keys: Any) -> None:
         """Write the nearest samples of the mesh in a band of rows, as `fill`."""
@@ -113,6 +118,16 @@ def _room() -> tuple[Any, Any]:
     return (np.empty(len(SAMPLES), np.int64), np.empty(len(SAMPLES), np.int64)), values
 
 
+def _room_for_light(width: int) -> Any:
+    """Return arrays for a thread to work in, as `light_band` takes them."""
+    kinds, per = len(surfaces()), len(SAMPLES)
+    whole = np.empty(per, np.int64), np.empty((SETUPS, 3), np.int64), np.empty(kinds, np.int64)
+    values = np.empty(per, np.float32), np.empty(ROWS, np.float32), np.empty(CHANNELS, np.float32)
+    points = np.empty((SETUPS, SETUP), np.float32), np.zeros((kinds, ROWS * ROOM), np.float32)
+    sums = np.empty((kinds, ROOM), np.float32), np.empty((width, 4), np.float32)
+    return (*whole, np.empty((kinds, ROOM), np.int64)), (*values, *points, *sums)
+
+
 class SoftwareCanvas(Canvas):
     """A head drawn by the processor."""
 
@@ -132,13 +147,18 @@ class SoftwareCanvas(Canvas):
         self._raster.close()
 
 
-def lights_of(light: Light) -> tuple[Float32, Float32, Float32, np.float32, Float32]:
-    """Return a light as `shading.reflected` takes it: lamps, environment, rim lamp's power, glint."""
-    lamps = [
-        [unit(lamp.direction), np.multiply(lamp.colour, light.exposure)] for lamp in (light.key, light.rim)
-    ]
+def lights_of(light: Light) -> tuple[Any, Float32]:
+    """Return a light as `shading.reflected` takes it, in numbers, and the environment that is mirrored."""
     exposure = np.float32(light.exposure)
+    lamps: Float32 = np.array(
+        [[unit(lamp.direction), np.multiply(lamp.colour, exposure)] for lamp in (light.key, light.rim)],
+        np.float32,
+    )
+    around = tuple(map(tuple, light.environment.sh * exposure))
+    glint = np.float32(light.glint), np.float32(light.glint_width)
     return (
-        np.array(lamps, np.float32), light.environment.sh * exposure, mirrored_of(light),
-        np.float32(light.rim_power), np.array([light.glint, light.glint_width], np.float32),
-    )  # fmt: skip
+        tuple(tuple(map(tuple, lamp)) for lamp in lamps),
+        around,
+        np.float32(light.rim_power),
+        glint,
+    ), mirrored_of(light)

@@ -19,7 +19,6 @@ from realizer.core.array_types import Float32
 from realizer.core.colours import srgb
 from realizer.render.compiled import compiled
 from realizer.render.surfaces import (
-    COAT,
     DIRECT,
     GLINT,
     REFLECTION,
@@ -63,19 +62,42 @@ def unit(a: Any) -> Any:
 
 
 @compiled
+def exp2(x: Any) -> Any:
+    """Return 2 to the power of `x`, or of -126 if that is more, within 1 of 100,000.
+
+    Calls of a library's function would keep the processor from shading many points at a time.
+    """
+    up = max(x, np.float32(-126)) + np.float32(127)
+    whole = np.int32(up)
+    f = up - np.float32(whole)
+    root = (np.float32(0.013684) * f + np.float32(0.0517177)) * f + np.float32(0.2416213)
+    root = (root * f + np.float32(0.6929696)) * f + np.float32(1.0000036)
+    return root * np.int32(whole << 23).view(np.float32)
+
+
+@compiled
+def log2(x: Any) -> Any:
+    """Return the logarithm of a number above 0, within 0.0001; of 0, about -127."""
+    bits = np.float32(x).view(np.int32)
+    m = np.int32(bits & 0x7FFFFF | 0x3F800000).view(np.float32)
+    log = (np.float32(-0.0800109) * m + np.float32(0.6355111)) * m - np.float32(2.0994023)
+    return (log * m + np.float32(4.0496168)) * m - np.float32(2.5056146) + np.float32((bits >> 23) - 127)
+
+
+@compiled
 def _ambient(around: Any, c: Any, n: Any) -> Any:
     """Return the light of the environment in channel `c` on a white surface with that normal."""
     x, y, z = n
-    light = around[0, c] + around[1, c] * y + around[2, c] * z + around[3, c] * x
+    light = around[0][c] + around[1][c] * y + around[2][c] * z + around[3][c] * x
     light += (
-        around[4, c] * x * y + around[5, c] * y * z + around[6, c] * (np.float32(3) * z * z - np.float32(1))
+        around[4][c] * x * y + around[5][c] * y * z + around[6][c] * (np.float32(3) * z * z - np.float32(1))
     )
-    light += around[7, c] * x * z + around[8, c] * (x * x - y * y)
+    light += around[7][c] * x * z + around[8][c] * (x * x - y * y)
     return max(light, np.float32(0))
 
 
 @compiled
-def _mirrored(levels: Any, d: Any, rough: Any) -> Any:
+def mirrored(levels: Any, d: Any, rough: Any) -> Any:
     """Return the light that a surface of that roughness mirrors from direction `d`.
 
     Levels (k, n, n, 3) are octahedral maps: forwards is the middle, backwards the corners.
@@ -96,10 +118,10 @@ def _mirrored(levels: Any, d: Any, rough: Any) -> Any:
         wk = fk if dk else one - fk
         for dy in range(2):
             wy = wk * (fy if dy else one - fy)
-            first, second = levels[k + dk, y0 + dy, x0], levels[k + dk, y0 + dy, x0 + 1]
-            r += wy * ((one - fx) * first[0] + fx * second[0])
-            g += wy * ((one - fx) * first[1] + fx * second[1])
-            b += wy * ((one - fx) * first[2] + fx * second[2])
+            j, near, far = y0 + dy, wy * (one - fx), wy * fx
+            r += near * levels[k + dk, j, x0, 0] + far * levels[k + dk, j, x0 + 1, 0]
+            g += near * levels[k + dk, j, x0, 1] + far * levels[k + dk, j, x0 + 1, 1]
+            b += near * levels[k + dk, j, x0, 2] + far * levels[k + dk, j, x0 + 1, 2]
     return r, g, b
 
 
@@ -113,13 +135,13 @@ def _gloss(rough: Any, nh: Any, nl: Any, nv: Any) -> Any:
 
 
 @compiled
-def _strand_gloss(strand: Any, normal: Any, half: Any, shift: Any, power: Any) -> Any:
-    """Return the highlight of a hair whose scales tilt it by `shift` towards its root."""
+def _sine(strand: Any, normal: Any, half: Any, shift: Any) -> Any:
+    """Return the squared sine to `half` of a hair whose scales tilt it by `shift` towards its root."""
     t = unit((
         strand[0] + shift * normal[0], strand[1] + shift * normal[1], strand[2] + shift * normal[2]
     ))  # fmt: skip
     th = dot(t, half)
-    return math.pow(max(np.float32(1) - th * th, np.float32(1e-6)), power * np.float32(0.5))
+    return max(np.float32(1) - th * th, np.float32(1e-6))
 
 
 @compiled
@@ -131,8 +153,8 @@ def _scattered(c: Any, a: Any, row: Any, cosines: Any, occlusion: Any, lamps: An
     facing = max(zero, (relief + (smooth - relief) * row[SOFT + c] + wrap) / (one + wrap))
     # Strands are lit across, all around but from behind the hair.
     facing += across * (np.float32(math.sqrt(across)) * max(zero, np.float32(0.5) + smooth) - facing)
-    behind = max(zero, np.float32(0.1) - smooth) * thin * THIN[c]
-    return a * (lamps[KEY, 1, c] * (facing * reached * occlusion + behind) + lamps[RIM, 1, c] * rim)
+    behind = max(zero, np.float32(0.1) - smooth) * thin * np.float32(THIN[c])
+    return a * (lamps[KEY][1][c] * (facing * reached * occlusion + behind) + lamps[RIM][1][c] * rim)
 
 
 @compiled
@@ -150,11 +172,7 @@ def _open(a: Any, occlusion: Any) -> Any:
 def _mirror_share(f0: Any, rough: Any, nv: Any) -> Any:
     """Return the share of the environment's light that is mirrored."""
     x = np.float32(1) - rough
-    term = (
-        min(x * x, np.float32(math.exp(np.float32(-6.4324) * nv))) * x
-        - rough * np.float32(0.0275)
-        + np.float32(0.0425)
-    )
+    term = min(x * x, exp2(np.float32(-9.28) * nv)) * x - rough * np.float32(0.0275) + np.float32(0.0425)
     scale = np.float32(-1.04) * term - rough * np.float32(0.572) + np.float32(1.04)
     return max(
         f0 * scale + np.float32(1.04) * term + rough * np.float32(0.022) - np.float32(0.04), np.float32(0)
@@ -186,70 +204,78 @@ def _glint(n: Any, key: Any, view: Any, glint: Any, rough: Any) -> Any:
     inside = (width - np.float32(math.sqrt(dot(off, off)))) / (width * np.float32(0.5))
     inside = min(max(inside, np.float32(0)), np.float32(1))
     clear = min(max(np.float32(2) - np.float32(5.5) * rough, np.float32(0.15)), np.float32(1))
-    return np.float32(GLINT) * clear * inside * inside * (np.float32(3) - 2 * inside)
+    return np.float32(GLINT) * clear * inside * inside * (np.float32(3) - np.float32(2) * inside)
 
 
 @compiled
-def reflected(row: Any, hair: Any, albedo: Any, normals: Any, values: Any, view: Any, lights: Any) -> Any:
-    """Return the light (r, g, b) that a surface sends to the eye.
+def reflected(
+    row: Any, hair: Any, coat: Any, albedo: Any, normals: Any, values: Any, view: Any, lights: Any
+) -> Any:
+    """Return the light (r, g, b) that a surface sends to the eye without that which it mirrors from around.
+
+    That is `mirrored` from a direction, times a share: these are returned, too, as (x, y, z) and a number.
 
     Args:
-        row: its row of `surfaces`; hair: whether it is made of strands.
+        row: its row of `surfaces`; hair, coat: whether it is made of strands, or has a smooth coat.
         albedo: (r, g, b) linear.
         normals: of the relief, of the smooth surface, and the direction of strands; unit vectors.
         values: occlusion, roughness, thickness 0..1, and the share of the key light that is not in shadow.
         view: unit vector to the eye.
         lights: lamps (2, 2, 3): direction and colour of the key and the rim lamp; the environment's `sh`
-            (9, 3) and `levels` (k, h, w, 3); the rim lamp's power; place and width of the glint.
+            (9, 3); the rim lamp's power; place and width of the glint.
     """
     n, smooth, strand = normals
     occlusion, rough, thickness, reached = values
-    lamps, sh, levels, rim_power, glint = lights
+    lamps, sh, rim_power, glint = lights
     one, zero = np.float32(1), np.float32(0)
     reached += row[SHADED] * occlusion * occlusion * (one - reached)
-    key, rim = lamps[KEY, 0], lamps[RIM, 0]
+    key, rim = lamps[KEY][0], lamps[RIM][0]
     reach = one - np.float32(DIRECT) * (one - occlusion)
     nv, nl, nl_smooth = max(dot(n, view), np.float32(1e-3)), dot(n, key), dot(smooth, key)
-    edge = np.float32(math.pow(one - min(nv, one), rim_power)) * reach
-    # Cards are made of flat pieces; the strands that they show bend as evenly as the normals do.
-    along = dot(strand, smooth)
-    strand = unit((
-        strand[0] - along * smooth[0], strand[1] - along * smooth[1], strand[2] - along * smooth[2]
-    ))  # fmt: skip
-    along = dot(strand, key)
+    edge = exp2(rim_power * log2(one - min(nv, one))) * reach
+    across = zero
+    if hair:
+        # Cards are made of flat pieces; the strands that they show bend as evenly as the normals do.
+        along = dot(strand, smooth)
+        strand = unit((
+            strand[0] - along * smooth[0], strand[1] - along * smooth[1], strand[2] - along * smooth[2]
+        ))  # fmt: skip
+        along = dot(strand, key)
+        across = max(one - along * along, zero)
     cosines = (
-        nl, nl_smooth, max(one - along * along, zero) if hair else zero, reached,
+        nl, nl_smooth, across, reached,
         max(zero, (dot(n, rim) + np.float32(0.3)) / np.float32(1.3)) * edge,
         (one - thickness) * row[THROUGH] * occlusion * occlusion,
     )  # fmt: skip
     a, b, c = albedo
-    red = _scattered(0, a, row, cosines, reach, lamps) + a * _ambient(sh, 0, n) * _open(a, occlusion)
-    green = _scattered(1, b, row, cosines, reach, lamps) + b * _ambient(sh, 1, n) * _open(b, occlusion)
-    blue = _scattered(2, c, row, cosines, reach, lamps) + c * _ambient(sh, 2, n) * _open(c, occlusion)
+    around = _ambient(sh, 0, n), _ambient(sh, 1, n), _ambient(sh, 2, n)
+    red = _scattered(0, a, row, cosines, reach, lamps) + a * around[0] * _open(a, occlusion)
+    green = _scattered(1, b, row, cosines, reach, lamps) + b * around[1] * _open(b, occlusion)
+    blue = _scattered(2, c, row, cosines, reach, lamps) + c * around[2] * _open(c, occlusion)
     half = unit((key[0] + view[0], key[1] + view[1], key[2] + view[2]))
+    power = lamps[KEY][1]
     if hair:
         lit = max(zero, np.float32(0.35) + nl_smooth) * reached * reach * (one - rough * np.float32(0.6))
-        white = (
-            lit * _strand_gloss(strand, smooth, half, np.float32(-0.08), np.float32(90)) * np.float32(0.07)
-        )
-        tinted = lit * _strand_gloss(strand, smooth, half, np.float32(0.10), np.float32(22))
+        white = lit * _sine(strand, smooth, half, np.float32(-0.08)) ** 45 * np.float32(0.07)
+        tinted = lit * _sine(strand, smooth, half, np.float32(0.10)) ** 11
         sheen = row[REFLECTION] * occlusion
         return (
-            red + (white + tinted * a) * lamps[KEY, 1, 0] + sheen * _ambient(sh, 0, n),
-            green + (white + tinted * b) * lamps[KEY, 1, 1] + sheen * _ambient(sh, 1, n),
-            blue + (white + tinted * c) * lamps[KEY, 1, 2] + sheen * _ambient(sh, 2, n),
+            (
+                red + (white + tinted * a) * power[0] + sheen * around[0],
+                green + (white + tinted * b) * power[1] + sheen * around[1],
+                blue + (white + tinted * c) * power[2] + sheen * around[2],
+            ),
+            n,
+            zero,
         )
-    f0 = row[REFLECTION]
-    if row[COAT] > 0:
+    if coat:
         n, nv = smooth, max(dot(smooth, view), np.float32(1e-3))
         shine = _glint(smooth, key, view, glint, rough)
     else:
         shine = _lobes(row, n, half, view, (nl, nv), rough) * reached * reach
-    mirrored = _mirror_share(f0, rough, nv) * occlusion * occlusion
     turn = np.float32(2) * dot(n, view)
-    sky = _mirrored(levels, (turn * n[0] - view[0], turn * n[1] - view[1], turn * n[2] - view[2]), rough)
     return (
-        red + shine * lamps[KEY, 1, 0] + mirrored * sky[0],
-        green + shine * lamps[KEY, 1, 1] + mirrored * sky[1],
-        blue + shine * lamps[KEY, 1, 2] + mirrored * sky[2],
+        (red + shine * power[0], green + shine * power[1], blue + shine * power[2]),
+        (turn * n[0] - view[0], turn * n[1] - view[1], turn * n[2] - view[2]),
+        _mirror_share(row[REFLECTION], rough, nv) * occlusion * occlusion,
     )

@@ -13,14 +13,19 @@ from realizer.render.raster import Raster
 from realizer.render.textures import texels_of
 
 SIZE = (60, 40)
+
+
+def numbers(values):
+    """Numbers in tuples, as float32."""
+    return tuple(map(numbers, values)) if isinstance(values, tuple) else np.float32(values)
+
+
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 SEEN = 232  # the tone curve's byte of white light
+NO_LAMP = ((0.0,) * 3, (0.0,) * 3)
 LIGHTS = (
-    np.zeros((2, 2, 3), np.float32),
-    np.float32([[1, 1, 1]] + [[0, 0, 0]] * 8),
+    numbers(((NO_LAMP, NO_LAMP), ((1.0,) * 3, *[(0.0,) * 3] * 8), 2.0, (1.0, 0.1))),
     np.zeros((5, 32, 32, 3), np.float32),
-    np.float32(2),
-    np.float32([1, 0.1]),
 )
 
 

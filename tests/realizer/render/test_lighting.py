@@ -7,36 +7,11 @@ import pytest
 
 from realizer.face.drawn_mesh import CLOTH, EYE
 from realizer.face.maps import Maps
-from realizer.render.lamp_view import SIDE, LampView
-from realizer.render.lighting import reach
 from realizer.render.shading import BRIGHTEST, STEPS, tone_curve
 from realizer.render.textures import texels_of
 from tests.realizer.render.rasters import BIG, RED, draw, picture_of, raster_of, webp
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
-UP = np.float32([0, 1, 0])
-
-
-def test_reach_is_dark_behind_and_light_before():
-    """A sheet over half of the box at depth 0.3: below it is shadow, above it and beside it light."""
-    view = LampView((0, 1, 0), (-1, -1, -1), (1, 1, 1))
-    depths = np.ones((SIDE, SIDE, 4), np.float32)
-    half = view.project(np.float32([[0, 0, 0]]))[0, 0]
-    depths[:, : int(half)] = 0.3
-    shadows = depths, view.matrix
-    left = -0.3 if view.matrix[0, 0] > 0 else 0.3
-
-    def at(x, y):
-        return reach(shadows, np.float32([x, y, 0]), UP)
-
-    assert at(left, -0.9) < 0.01
-    assert at(left, 0.9) == pytest.approx(1)
-    assert at(-left, -0.9) == pytest.approx(1, abs=0.01)
-    top, bottom = view.project(np.float32([[left, 1, 0], [left, -1, 0]]))[:, 2]
-    assert at(left, 1 - 2 * (0.3 - top) / (bottom - top)) == pytest.approx(1), "it does not shade itself"
-    edge = [at(x, -0.9) for x in np.linspace(left / 20, -left / 20, 41)]
-    assert (np.diff(edge) >= -1e-3).all()
-    assert any(0.2 < share < 0.8 for share in edge)
 
 
 def test_light_band_smooths_edges():

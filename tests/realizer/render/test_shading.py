@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from realizer.face.drawn_mesh import CLOTH, EYE, HAIR, SKIN, WET
-from realizer.render.shading import BRIGHTEST, STEPS, reflected, tone_curve, unit
+from realizer.render.shading import BRIGHTEST, STEPS, exp2, log2, mirrored, reflected, tone_curve, unit
 from realizer.render.surfaces import REFLECTION, SHADED, surfaces
 
 pytestmark = [pytest.mark.gl("onboard"), pytest.mark.xdist_group("render")]
@@ -20,12 +20,14 @@ def light(kind=CLOTH, normal=FRONT, view=FRONT, albedo=GREY, key=FRONT, around=0
     sh[0] = around
     levels = np.full((5, 32, 32, 3), sky, np.float32)
     values = values or (1.0, 0.5, 1.0, 1.0)
-    lights = lamps, sh, levels, np.float32(2), np.float32([1, 0.1])
+    lights = lamps, sh, np.float32(2), np.float32([1, 0.1])
     normals = tuple(normal), tuple(normal), (np.float32(0), np.float32(1), np.float32(0))
     numbers = tuple(np.float32(v) for v in values)
-    return np.array(
-        reflected(surfaces()[kind], kind == HAIR, tuple(albedo), normals, numbers, tuple(view), lights)
+    row = surfaces()[kind]
+    sent, towards, share = reflected(
+        row, kind == HAIR, kind == EYE, tuple(albedo), normals, numbers, tuple(view), lights
     )
+    return np.array(sent) + share * np.array(mirrored(levels, towards, numbers[1]))
 
 
 @pytest.mark.slow
@@ -83,6 +85,14 @@ def test_reflected_light_of_an_eye_shows_the_lamp_as_a_disc():
     key = unit(np.float32([1, 0, 1]))
     assert light(EYE, normal=unit(key + FRONT), key=key, values=clear)[0] > 1
     assert (light(EYE) < lit - 0.8).all()
+
+
+def test_exp2_and_log2_are_those_of_numpy():
+    for x in np.linspace(-130, 4, 1000, dtype=np.float32):
+        assert exp2(x) == pytest.approx(np.exp2(max(x, -126)), rel=1e-5)
+    for x in np.geomspace(1e-6, 4, 1000, dtype=np.float32):
+        assert log2(x) == pytest.approx(np.log2(x), abs=2e-4)
+    assert log2(np.float32(0)) < -126
 
 
 def test_tone_curve_rises_to_white():
