@@ -17,8 +17,8 @@ from realizer.render.lighting import ROOM, ROWS, SETUP, SETUPS, light_band
 from realizer.render.shading import tone_curve
 from realizer.render.shadows import AWAY, depths_of, ends_around
 from realizer.render.surfaces import mirrored_of, surfaces
-from realizer.render.textures import CHANNELS, Texels
-from realizer.render.visibility import SAMPLES, fill
+from realizer.render.textures import ALPHA, CHANNELS, Texels
+from realizer.render.visibility import SAMPLES, fill, sort
 
 MAX_THREADS = 4
 
@@ -39,26 +39,22 @@ class Raster:
             RenderError: numba is not installed; the text says what to install.
         """
         width, height = size
-        # The samples of a pixel are adjacent, so that a small triangle writes to adjacent memory. A sample is
-        # one number with nearness in the upper half and its triangle in the lower one, so that the greater
-        # number is the nearer sample.
-        self._keys = np.zeros((height, width, len(SAMPLES)), np.uint64)
         self._picture = np.zeros((height, width, 4), np.uint8)
         self._texels = texels.values, texels.levels
-        self._sides = mesh.two_sided.astype(np.uint8) | mesh.see_through.astype(np.uint8) << 1
         fixed = np.column_stack([mesh.uv, colours, mesh.occlusion, mesh.roughness]).astype(np.float32)
         rows = tuple(map(tuple, surfaces()))
         to_linear = linear(np.arange(256, dtype=np.uint8))
         self._mesh = mesh.triangles, fixed, mesh.kind, rows, to_linear, tone_curve()
+        sides = mesh.two_sided.astype(np.uint8) | mesh.see_through.astype(np.uint8) << 1
+        holes = np.ascontiguousarray(texels.values[:, ALPHA]), texels.levels
         # Each thread draws a band of rows; the loops release Python's lock.
-        bands = max(1, min(MAX_THREADS, os.cpu_count() or 1, height))
-        self._bands = _bands(height, 4 * bands)
-        self._pool = ThreadPoolExecutor(bands)
+        threads = max(1, min(MAX_THREADS, os.cpu_count() or 1, height))
+        self._pool = ThreadPoolExecutor(threads)
         self._lamp = lamp
-        self._samples = np.zeros((SIDE, SIDE, len(SAMPLES)), np.uint64)
-        self._depths = np.empty(self._samples.shape, np.float32)
+        self.front = View(size, 4 * threads, (mesh.triangles, sides, fixed, holes))
+        self.cast = View((SIDE, SIDE), 2 * threads, (mesh.triangles, sides, fixed, holes))
+        self._depths = np.empty(self.cast.keys.shape, np.float32)
         self._ends = np.empty((2, SIDE, SIDE, 2), np.float32)
-        self._shadow_bands = _bands(SIDE, 2 * bands)
 
     def __call__(self, points: Any, nearness: Float32, moving: Float32, lights: Any, eye: Float32) -> UInt8:
         """Return the picture (h, w, 4) uint8, premultiplied, from the top; it is valid until the next call.
@@ -71,16 +67,16 @@ class Raster:
             lights: as `shading.reflected` takes them, and the maps of the environment that is mirrored.
             eye: (3,) place of the camera in metres.
         """
-        points = np.ascontiguousarray(points, np.float64)
-        nearness = np.ascontiguousarray(nearness, np.float32)
+        ordered = self._pool.submit(self.front.sort, points, nearness)
         shadows = *self._shadow_map(moving), self._lamp.matrix
+        ordered.result()
 
         def band(rows: tuple[int, int]) -> None:
-            self._see(points, nearness, rows, self._keys)
-            pictures = self._keys, self._picture, _room_for_light(self._picture.shape[1])
+            self.front.fill(points, nearness, rows)
+            pictures = self.front.keys, self._picture, _room(self._picture.shape[1])
             light_band(points, moving, self._mesh, self._texels, lights, (eye, shadows), rows, pictures)
 
-        list(self._pool.map(band, self._bands))
+        list(self._pool.map(band, self.front.bands))
         return self._picture
 
     def _shadow_map(self, moving: Float32) -> tuple[Float32, Float32]:
@@ -88,37 +84,53 @@ class Raster:
         points = self._lamp.project(moving[:, :3])
         nearness = (AWAY - points[:, 2]).astype(np.float32)
         ends, around = self._ends
+        self.cast.sort(points, nearness)
 
         def band(rows: tuple[int, int]) -> None:
-            self._see(points, nearness, rows, self._samples)
-            depths_of(self._samples, rows, self._depths, ends)
+            self.cast.fill(points, nearness, rows)
+            depths_of(self.cast.keys, rows, self._depths, ends)
 
-        list(self._pool.map(band, self._shadow_bands))
-        list(self._pool.map(lambda rows: ends_around(ends, rows, around), self._shadow_bands))
+        list(self._pool.map(band, self.cast.bands))
+        list(self._pool.map(lambda rows: ends_around(ends, rows, around), self.cast.bands))
         return self._depths, around
-
-    def _see(self, points: Any, nearness: Float32, rows: tuple[int, int], keys: Any) -> None:
-        """Write the nearest samples of the mesh in a band of rows, as `fill`."""
-        triangles, fixed = self._mesh[:2]
-        fill(points, nearness, triangles, self._sides, fixed, self._texels, rows, (keys, *_room()))
 
     def close(self) -> None:
         """End the threads."""
         self._pool.shutdown()
 
 
-def _bands(rows: int, count: int) -> list[tuple[int, int]]:
-    """Return the first and last + 1 row of bands of about the same height."""
-    return list(pairwise(rows * k // count for k in range(count + 1)))
+class View:
+    """What is seen from one place.
+
+    Attributes:
+        keys: (h, w, samples) uint64. The samples of a pixel are adjacent, so that a small triangle writes to
+            adjacent memory. A sample is one number with nearness in the upper half and its triangle in the
+            lower one, so that the greater number is the nearer sample.
+        bands: first and last + 1 row of bands of about the same height.
+    """
+
+    def __init__(self, size: tuple[int, int], bands: int, mesh: Any) -> None:
+        """Reserve memory; `mesh` is triangles, sides, fixed and holes, as `fill` takes them."""
+        width, height = size
+        self.keys = np.zeros((height, width, len(SAMPLES)), np.uint64)
+        self._starts = np.arange(bands + 1) * height // bands
+        self.bands = list(pairwise(self._starts.tolist()))
+        self._mesh = mesh
+        self._chosen, self._counts = np.empty((bands, len(mesh[0])), np.int32), np.empty(bands, np.int64)
+
+    def sort(self, points: Any, nearness: Float32) -> None:
+        """Choose the triangles of each band; arguments as of `Raster`."""
+        triangles, sides, _, _ = self._mesh
+        sort(points, nearness, triangles, sides, self._starts, self._chosen, self._counts)
+
+    def fill(self, points: Any, nearness: Float32, rows: tuple[int, int]) -> None:
+        """Write the nearest samples of a band."""
+        band = self.bands.index(rows)
+        chosen = self._chosen[band, : self._counts[band]]
+        fill(points, nearness, chosen, self._mesh, rows, self.keys)
 
 
-def _room() -> tuple[Any, Any]:
-    """Return arrays for a thread to work in: two of whole numbers and two of values, one a sample."""
-    values = np.empty(len(SAMPLES), np.float32), np.empty(CHANNELS, np.float32)
-    return (np.empty(len(SAMPLES), np.int64), np.empty(len(SAMPLES), np.int64)), values
-
-
-def _room_for_light(width: int) -> Any:
+def _room(width: int) -> Any:
     """Return arrays for a thread to work in, as `light_band` takes them."""
     kinds, per = len(surfaces()), len(SAMPLES)
     whole = np.empty(per, np.int64), np.empty((SETUPS, 3), np.int64), np.empty(kinds, np.int64)

@@ -62,12 +62,12 @@ def by_processor(canvas: SoftwareCanvas, vertices: Float32, normals: Float32) ->
     near = (1 / distances).astype(np.float32)
 
     def see(rows: tuple[int, int]) -> None:
-        raster._keys[rows[0] : rows[1]] = 0
-        raster._see(points, near, rows, raster._keys)
+        raster.front.keys[rows[0] : rows[1]] = 0
+        raster.front.fill(points, near, rows)
 
     moved = median(lambda: canvas._mesh(vertices, normals, canvas._folds(vertices)), 30)
     shadow = median(lambda: raster._shadow_map(moving), 30)
-    seen = median(lambda: list(raster._pool.map(see, raster._bands)), 30)
+    seen = median(lambda: list(raster._pool.map(see, raster.front.bands)), 30)
     rest = whole - moved - shadow - seen
     return [("mesh", moved), ("shadow", shadow), ("visibility", seen), ("light", rest), ("all", whole)]
 
