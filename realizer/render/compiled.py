@@ -37,8 +37,15 @@ def compiled(loop: Loop) -> Loop:
         fast._cache._cache_file._source_stamp = state_of_sources()
     except RuntimeError:  # neither our folder nor the user's can be written
         fast = numba.njit(**OPTIONS)(loop)
+    fast._compiler._customize_flags = _apart
     typed: Loop = fast
     return typed
+
+
+def _apart(flags: Any) -> Any:
+    """Tell the compiler that no two arrays of a call overlap, which it cannot see."""
+    flags.noalias = True
+    return flags
 
 
 @cache
@@ -46,7 +53,9 @@ def state_of_sources(folder: Path = Path(__file__).parent) -> str:
     """Return a digest of the files of a folder of ours that hold loops, and of those that they import."""
     texts = [path.read_text("utf-8") for path in sorted(folder.glob("*.py"))]
     loops = [text for text in texts if "\n@compiled\n" in text]
-    names = {name for text in loops for name in re.findall(r"^from realizer\.(\S+)", text, re.MULTILINE)}
+    imports = re.compile(r"^from realizer\.(\S+) import (\w+)", re.MULTILINE)
+    pairs = [pair for text in loops for pair in imports.findall(text)]
+    names = {name for package, name in pairs for name in (package, f"{package}.{name}")}
     files = (folder.parent / f"{name.replace('.', '/')}.py" for name in sorted(names))
     read = [path.read_text("utf-8") for path in files if path.is_file()]
     return hashlib.sha256("\0".join([*loops, *read]).encode()).hexdigest()

@@ -6,67 +6,80 @@ from typing import Any
 import numpy as np
 
 from realizer.face.drawn_mesh import EYE, HAIR
+from realizer.render import textures as maps
 from realizer.render.compiled import compiled
 from realizer.render.shading import BRIGHTEST, STEPS, dot, mirrored, reflected, unit
 from realizer.render.shadows import reach
 from realizer.render.surfaces import BENT, BOWL
-from realizer.render.textures import CHANNELS, DEPTH, FOLD_SHADE, IRIS, STEEPEST
 from realizer.render.visibility import SAMPLES, level_of
 
 # Samples of one kind are lit once where their nearness differs by less than this share, and the green of
 # their triangles' colours by less than that.
 SAME, TINT = np.float32(8e-4), np.float32(0.05)
 SETUPS = 512  # triangles whose setup a thread keeps
-# Columns of a setup: what is fixed and what moves at the first corner, and the steps to the two others; the
-# directions in which u and v grow, with the scale; place in the picture, and changes to the right and down.
-FIXED, MOVING, ONE, OTHER, ALONG, DOWN, SCALE, CORNER, CHANGES, SETUP = 0, 7, 17, 34, 51, 54, 57, 58, 60, 64
-# Rows of points that are lit together. The light replaces the place, the direction that is mirrored and its
-# share replace the normal and the first of the strand.
-ROOM, PLACE, NORMAL, STRAND, SLOPE, ALBEDO, VALUES, ROWS = 256, 0, 3, 6, 9, 12, 15, 19
+# Rows of points that are lit together, and columns of a setup: what is fixed and what moves, then what is the
+# same all over a triangle: directions in which u and v grow, their scale, and the level of the maps.
+UV, COLOUR, OCCLUDED, ROUGH, PLACE, NORMAL, FOLD, STRAND = 0, 2, 5, 6, 7, 10, 13, 14
+VARIED, ALONG, DOWN, SCALE, LEVEL, REACHED, ROWS = 17, 17, 20, 23, 24, 27, 28
+# In a setup the former are those of the first corner. Steps to the two others follow, the place of the corner
+# in the picture, and how much of the steps a pixel to the right and down is.
+ONE, OTHER, CORNER, CHANGES, SETUP = 27, 44, 61, 63, 67
+# Results replace the first rows.
+LIGHT, MIRRORED, SHARE = 0, 3, 7
+ROOM = 256  # points at most
 TOGETHER = 16  # points are lit in multiples of this, so that none is left over
 
 
 @compiled
-def _texel(texels: Any, level: Any, u: Any, v: Any, out: Any) -> None:
-    """Write the maps' values at a place, (CHANNELS,) 0..255, between the four texels around it."""
-    values, levels = texels
-    first, wide, tall = levels[level, 0], levels[level, 1], levels[level, 2]
-    x, y = u * np.float32(wide) - np.float32(0.5), v * np.float32(tall) - np.float32(0.5)
-    left, upper = math.floor(x), math.floor(y)
+def _taps(texels: Any, level: Any, u: Any, v: Any) -> Any:
+    """Return `texels`, (n, 3) uint32, the numbers of the four around a place, and their weights."""
+    first, wide, tall = level
+    half, zero, one = np.float32(0.5), np.float32(0), np.float32(1)
+    x, y = min(max(u * wide - half, zero), wide - one), min(max(v * tall - half, zero), tall - one)
+    left, upper, side = np.int32(x), np.int32(y), np.int32(wide)
     fx, fy = x - np.float32(left), y - np.float32(upper)
-    x0, x1 = min(max(left, 0), wide - 1), min(max(left + 1, 0), wide - 1)
-    y0, y1 = first + min(max(upper, 0), tall - 1) * wide, first + min(max(upper + 1, 0), tall - 1) * wide
-    one = np.float32(1)
-    w00, w10, w01, w11 = (one - fx) * (one - fy), fx * (one - fy), (one - fx) * fy, fx * fy
-    for k in range(CHANNELS):
-        out[k] = (
-            w00 * np.float32(values[y0 + x0, k]) + w10 * np.float32(values[y0 + x1, k])
-            + w01 * np.float32(values[y1 + x0, k]) + w11 * np.float32(values[y1 + x1, k])
-        )  # fmt: skip
+    right = min(left + 1, side - 1)
+    up, down = np.int32(first) + upper * side, np.int32(first) + min(upper + 1, np.int32(tall) - 1) * side
+    four = np.uint64(up + left), np.uint64(up + right), np.uint64(down + left), np.uint64(down + right)
+    return texels, four, ((one - fx) * (one - fy), fx * (one - fy), (one - fx) * fy, fx * fy)
+
+
+@compiled
+def _mixed(texel: Any, channel: Any) -> Any:
+    """Return a channel of the maps, 0..255, between four texels, as `_taps` returns them."""
+    texels, (a, b, c, d), (wa, wb, wc, wd) = texel
+    word, low = np.uint64(channel // 4), channel % 4 * 8
+    return (
+        wa * np.float32(np.int32(texels[a, word] >> low & 255))
+        + wb * np.float32(np.int32(texels[b, word] >> low & 255))
+        + wc * np.float32(np.int32(texels[c, word] >> low & 255))
+        + wd * np.float32(np.int32(texels[d, word] >> low & 255))
+    )
 
 
 @compiled
 def _set_up(t: Any, points: Any, moving: Any, mesh: Any, levels: Any, setup: Any, numbers: Any) -> None:
-    """Write the setup of a triangle; and its number, the level of the maps, and whether it is the back."""
+    """Write the setup of a triangle; and its number, and whether it is seen from the back."""
     triangles, fixed = mesh[0], mesh[1]
     a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
     ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
     vx, vy = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1]
     turn = ux * vy - vx * uy
-    for k in range(MOVING):
+    for k in range(PLACE):
         setup[k] = fixed[a, k]
         setup[ONE + k], setup[OTHER + k] = fixed[b, k] - fixed[a, k], fixed[c, k] - fixed[a, k]
-    for k in range(ONE - MOVING):
-        at = MOVING + k
+    for k in range(VARIED - PLACE):
+        at = PLACE + k
         setup[at] = moving[a, k]
         setup[ONE + at], setup[OTHER + at] = moving[b, k] - moving[a, k], moving[c, k] - moving[a, k]
     along, down, scale = _frame(setup)
+    level = levels[level_of(fixed, levels, (a, b, c), turn)]
     for k in range(3):
-        setup[ALONG + k], setup[DOWN + k] = along[k], down[k]
+        setup[ALONG + k], setup[DOWN + k], setup[LEVEL + k] = along[k], down[k], level[k]
     setup[SCALE], setup[CORNER], setup[CORNER + 1] = scale, points[a, 0], points[a, 1]
     setup[CHANGES], setup[CHANGES + 1] = vy / turn, vx / turn
     setup[CHANGES + 2], setup[CHANGES + 3] = uy / turn, ux / turn
-    numbers[0], numbers[1], numbers[2] = t, level_of(fixed, levels, (a, b, c), turn), turn > 0
+    numbers[0], numbers[1] = t, turn > 0
 
 
 @compiled
@@ -78,7 +91,7 @@ def _vector(values: Any, k: Any) -> Any:
 @compiled
 def _frame(setup: Any) -> Any:
     """Return the unit vectors on a triangle along which u and v of the maps grow, and their scale, 1/m."""
-    e, f = _vector(setup, ONE + MOVING), _vector(setup, OTHER + MOVING)
+    e, f = _vector(setup, ONE + PLACE), _vector(setup, OTHER + PLACE)
     u, v, s, t = setup[ONE], setup[ONE + 1], setup[OTHER], setup[OTHER + 1]
     way = np.float32(1) if u * t - v * s > 0 else np.float32(-1)
     along = unit(((t * e[0] - v * f[0]) * way, (t * e[1] - v * f[1]) * way, (t * e[2] - v * f[2]) * way))
@@ -97,49 +110,25 @@ def _dive(depth: Any, n: Any, towards: Any) -> Any:
 
 
 @compiled
-def _point(
-    setup: Any, numbers: Any, kind: Any, x: Any, y: Any, texels: Any, eye: Any, shadows: Any, linear: Any,
-    out: Any, i: Any, room: Any,
-) -> None:  # fmt: skip
-    """Write point `i` of those that are lit together: that of a triangle at pixel (x, y)."""
-    values, texel = room
-    one, byte, half, zero_slope = np.float32(1), np.float32(1 / 255), np.float32(0.5), np.float32(128)
+def _point(setup: Any, back: Any, x: Any, y: Any, eye: Any, shadows: Any, out: Any, i: Any) -> None:
+    """Write point `i` of those that are lit together: that of a triangle at pixel (x, y).
+
+    Args:
+        back: whether its normal is turned towards the eye.
+    """
     dx, dy = x - setup[CORNER], y - setup[CORNER + 1]
     s = dx * setup[CHANGES] - dy * setup[CHANGES + 1]
     r = dy * setup[CHANGES + 3] - dx * setup[CHANGES + 2]
-    for k in range(ONE):
-        values[k] = setup[k] + s * setup[ONE + k] + r * setup[OTHER + k]
-    u, v = values[0], values[1]
-    _texel(texels, numbers[1], u, v, texel)
-    place, smooth, fold = _vector(values, MOVING), unit(_vector(values, MOVING + 3)), values[MOVING + 6]
-    su = sv = np.float32(0)
-    along, down = _vector(setup, ALONG), _vector(setup, DOWN)
-    if numbers[2] or kind == EYE:
-        towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
-        # Hairs have the normals of the head that they grow on, whichever way their card is seen.
-        if dot(smooth, towards) < 0 and numbers[2] and kind != HAIR:
-            smooth = (-smooth[0], -smooth[1], -smooth[2])
-        if kind == EYE and texel[8] < 254:
-            depth = np.float32(DEPTH) * (one - texel[8] * byte)
-            dive = setup[SCALE] * _dive(depth, smooth, towards)
-            u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
-            _texel(texels, numbers[1], u, v, texel)
-            bowl = np.float32(BOWL / IRIS[2]) * min(depth / np.float32(0.0004), one)
-            su, sv = bowl * (u - np.float32(IRIS[0])), bowl * (v - np.float32(IRIS[1]))
-    scale = np.float32(STEEPEST / 127)
-    su += (texel[4] - zero_slope + (texel[9] - zero_slope) * fold) * scale
-    sv += (texel[5] - zero_slope + (texel[10] - zero_slope) * fold) * scale
-    for k in range(3):
-        out[(PLACE + k) * ROOM + i] = place[k]
-        out[(NORMAL + k) * ROOM + i] = smooth[k]
-        out[(STRAND + k) * ROOM + i] = values[MOVING + 7 + k]
-        out[(SLOPE + k) * ROOM + i] = su * along[k] + sv * down[k]
-        out[(ALBEDO + k) * ROOM + i] = linear[int(texel[k] + half)] * values[2 + k]
-    occlusion = values[5] * texel[6] * byte * (one - np.float32(FOLD_SHADE) * fold * texel[11] * byte)
-    out[VALUES * ROOM + i] = occlusion
-    out[(VALUES + 1) * ROOM + i] = max(values[6] * texel[7] * byte, np.float32(0.06))
-    out[(VALUES + 2) * ROOM + i] = texel[8] * byte
-    out[(VALUES + 3) * ROOM + i] = reach(shadows, place, smooth)
+    for k in range(VARIED):
+        out[k * ROOM + i] = setup[k] + s * setup[ONE + k] + r * setup[OTHER + k]
+    for k in range(VARIED, REACHED):
+        out[k * ROOM + i] = setup[k]
+    place, smooth = _row(out, PLACE, i), unit(_row(out, NORMAL, i))
+    if back and dot(smooth, (eye[0] - place[0], eye[1] - place[1], eye[2] - place[2])) < 0:
+        smooth = (-smooth[0], -smooth[1], -smooth[2])
+        for k in range(3):
+            out[(NORMAL + k) * ROOM + i] *= np.float32(-1)
+    out[REACHED * ROOM + i] = reach(shadows, place, smooth)
 
 
 @compiled
@@ -149,47 +138,79 @@ def _row(points: Any, k: Any, i: Any) -> Any:
 
 
 @compiled
-def _lit(points: Any, count: Any, surface: Any, hair: Any, coat: Any, lights: Any, eye: Any) -> None:
-    """Replace the places of points of one kind by their light, and what follows by what they mirror."""
+def _lit(points: Any, count: Any, surface: Any, hair: Any, coat: Any, view: Any) -> None:
+    """Write the light of points of one kind, and what they mirror: its direction, share and roughness.
+
+    Numba lights as many at a time as the processor can.
+    """
+    lights, eye, texels, linear = view
+    one, byte, half, level = np.float32(1), np.float32(1 / 255), np.float32(0.5), np.float32(128)
     for i in range(count):
-        place, smooth, slope = _row(points, PLACE, i), _row(points, NORMAL, i), _row(points, SLOPE, i)
+        u, v, fold = points[i], points[ROOM + i], points[FOLD * ROOM + i]
+        place, smooth = _row(points, PLACE, i), unit(_row(points, NORMAL, i))
+        along, down = _row(points, ALONG, i), _row(points, DOWN, i)
         towards = unit((eye[0] - place[0], eye[1] - place[1], eye[2] - place[2]))
-        relief = unit((smooth[0] - slope[0], smooth[1] - slope[1], smooth[2] - slope[2]))
+        texel = _taps(texels, _row(points, LEVEL, i), u, v)
+        su = sv = np.float32(0)
+        if coat:
+            thick = _mixed(texel, maps.THICKNESS)
+            depth = (
+                np.float32(maps.DEPTH) * (one - thick * byte) if thick < np.float32(254) else np.float32(0)
+            )
+            dive = points[SCALE * ROOM + i] * _dive(depth, smooth, towards)
+            u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
+            texel = _taps(texels, _row(points, LEVEL, i), u, v)
+            bowl = np.float32(BOWL / maps.IRIS[2]) * min(depth / np.float32(0.0004), one)
+            su, sv = bowl * (u - np.float32(maps.IRIS[0])), bowl * (v - np.float32(maps.IRIS[1]))
+        scale = np.float32(maps.STEEPEST / 127)
+        su += scale * (_mixed(texel, maps.SLOPE_U) - level + (_mixed(texel, maps.FOLD_U) - level) * fold)
+        sv += scale * (_mixed(texel, maps.SLOPE_V) - level + (_mixed(texel, maps.FOLD_V) - level) * fold)
+        relief = unit((
+            smooth[0] - su * along[0] - sv * down[0],
+            smooth[1] - su * along[1] - sv * down[1],
+            smooth[2] - su * along[2] - sv * down[2],
+        ))  # fmt: skip
+        colour = _row(points, COLOUR, i)
+        albedo = (
+            linear[np.uint64(_mixed(texel, maps.RED) + half)] * colour[0],
+            linear[np.uint64(_mixed(texel, maps.GREEN) + half)] * colour[1],
+            linear[np.uint64(_mixed(texel, maps.BLUE) + half)] * colour[2],
+        )
+        occlusion = points[OCCLUDED * ROOM + i] * _mixed(texel, maps.OCCLUSION) * byte
+        occlusion *= one - np.float32(maps.FOLD_SHADE) * fold * _mixed(texel, maps.FOLD) * byte
+        rough = max(points[ROUGH * ROOM + i] * _mixed(texel, maps.ROUGHNESS) * byte, np.float32(0.06))
+        values = occlusion, rough, _mixed(texel, maps.THICKNESS) * byte, points[REACHED * ROOM + i]
         normals = relief, smooth, _row(points, STRAND, i)
-        values = (*_row(points, VALUES, i), points[(VALUES + 3) * ROOM + i])
-        albedo = _row(points, ALBEDO, i)
-        light, mirrored, share = reflected(surface, hair, coat, albedo, normals, values, towards, lights)
-        points[i], points[ROOM + i], points[2 * ROOM + i] = light
-        points[3 * ROOM + i], points[4 * ROOM + i], points[5 * ROOM + i] = mirrored
-        points[STRAND * ROOM + i] = share
+        light, around, share = reflected(surface, hair, coat, albedo, normals, values, towards, lights)
+        points[LIGHT * ROOM + i], points[(LIGHT + 1) * ROOM + i], points[(LIGHT + 2) * ROOM + i] = light
+        points[MIRRORED * ROOM + i], points[(MIRRORED + 1) * ROOM + i], points[(MIRRORED + 2) * ROOM + i] = (
+            around
+        )
+        points[SHARE * ROOM + i], points[ROUGH * ROOM + i] = share, rough
 
 
 @compiled
-def _add(kind: Any, count: Any, points: Any, into: Any, mesh: Any, lights: Any, eye: Any) -> None:
+def _add(kind: Any, count: Any, points: Any, into: Any, mesh: Any, view: Any) -> None:
     """Light points of one kind, and add their colours to the pixels of a row."""
-    lamps, levels = lights
+    (lamps, levels), eye, texels = view
     columns, weights, sums = into
-    curve, surface = mesh[5], mesh[3][kind]
+    surface, linear, curve = mesh[3][kind], mesh[4], mesh[5]
     full = (count + TOGETHER - 1) // TOGETHER * TOGETHER
+    seen = lamps, eye, texels, linear
     if kind == HAIR:
-        _lit(points, full, surface, True, False, lamps, eye)
+        _lit(points, full, surface, True, False, seen)
     elif kind == EYE:
-        _lit(points, full, surface, False, True, lamps, eye)
+        _lit(points, full, surface, False, True, seen)
     else:
-        _lit(points, full, surface, False, False, lamps, eye)
-    zero, one, bright, to_step = (
-        np.float32(0),
-        np.float32(1),
-        np.float32(1 / BRIGHTEST),
-        np.float32(STEPS - 1),
-    )
+        _lit(points, full, surface, False, False, seen)
+    zero, one, to_step = np.float32(0), np.float32(1), np.float32(STEPS - 1)
     for i in range(count):
-        light, share = _row(points, PLACE, i), points[STRAND * ROOM + i]
+        light, share = _row(points, LIGHT, i), points[SHARE * ROOM + i]
         if share > zero:
-            sky = mirrored(levels, _row(points, NORMAL, i), points[(VALUES + 1) * ROOM + i])
+            sky = mirrored(levels, _row(points, MIRRORED, i), points[ROUGH * ROOM + i])
             light = light[0] + share * sky[0], light[1] + share * sky[1], light[2] + share * sky[2]
         for k in range(3):
-            step = np.float32(math.sqrt(min(max(light[k] * bright, zero), one))) * to_step
+            step = np.float32(math.sqrt(min(max(light[k] * np.float32(1 / BRIGHTEST), zero), one))) * to_step
             sums[columns[i], k] += weights[i] * curve[int(step)]
         sums[columns[i], 3] += weights[i]
 
@@ -200,9 +221,10 @@ def light_band(
 ) -> None:
     """Write the pixels of a band of rows, and clear its samples."""
     keys, picture, room = pictures
-    (found, numbers, counts, columns), (near, values, texel, setups, lit, weights, sums) = room
-    triangles, fixed, kinds, linear = mesh[0], mesh[1], mesh[2], mesh[4]
+    (found, numbers, counts, columns), (near, setups, lit, weights, sums) = room
+    triangles, fixed, kinds = mesh[0], mesh[1], mesh[2]
     place, shadows = eye
+    view = lights, place, texels[0]
     per = len(SAMPLES)
     nothing, low_half, high_half = np.uint64(0), np.uint64(0xFFFFFFFF), np.uint64(32)
     numbers[:, 0] = -1
@@ -240,19 +262,18 @@ def light_band(
                 if numbers[slot, 0] != t:
                     _set_up(t, points, moving, mesh, texels[1], setups[slot], numbers[slot])
                 px, py = np.float32(x + sx / inside), np.float32(y + sy / inside)
-                _point(
-                    setups[slot], numbers[slot], kind, px, py, texels, place, shadows, linear,
-                    lit[kind], i, (values, texel),
-                )  # fmt: skip
+                # Hairs have the normals of the head that they grow on, whichever way their card is seen.
+                back = numbers[slot, 1] and kind != HAIR
+                _point(setups[slot], back, px, py, place, shadows, lit[kind], i)
                 columns[kind, i], weights[kind, i] = x, weight
                 counts[kind] = i + 1
                 if i + 1 == ROOM:
-                    _add(kind, ROOM, lit[kind], (columns[kind], weights[kind], sums), mesh, lights, place)
+                    _add(kind, ROOM, lit[kind], (columns[kind], weights[kind], sums), mesh, view)
                     counts[kind] = 0
         for kind in range(len(counts)):
             if counts[kind]:
                 into = columns[kind], weights[kind], sums
-                _add(kind, counts[kind], lit[kind], into, mesh, lights, place)
+                _add(kind, counts[kind], lit[kind], into, mesh, view)
                 counts[kind] = 0
         part, half = np.float32(1 / per), np.float32(0.5)
         for x in range(keys.shape[1]):

@@ -17,7 +17,7 @@ from realizer.render.lighting import ROOM, ROWS, SETUP, SETUPS, light_band
 from realizer.render.shading import tone_curve
 from realizer.render.shadows import AWAY, depths_of, ends_around
 from realizer.render.surfaces import mirrored_of, surfaces
-from realizer.render.textures import ALPHA, CHANNELS, Texels
+from realizer.render.textures import ALPHA, Texels
 from realizer.render.visibility import SAMPLES, fill, sort
 
 MAX_THREADS = 4
@@ -40,7 +40,7 @@ class Raster:
         """
         width, height = size
         self._picture = np.zeros((height, width, 4), np.uint8)
-        self._texels = texels.values, texels.levels
+        self._texels = texels.values.view(np.uint32), texels.levels
         fixed = np.column_stack([mesh.uv, colours, mesh.occlusion, mesh.roughness]).astype(np.float32)
         rows = tuple(map(tuple, surfaces()))
         to_linear = linear(np.arange(256, dtype=np.uint8))
@@ -133,11 +133,11 @@ class View:
 def _room(width: int) -> Any:
     """Return arrays for a thread to work in, as `light_band` takes them."""
     kinds, per = len(surfaces()), len(SAMPLES)
-    whole = np.empty(per, np.int64), np.empty((SETUPS, 3), np.int64), np.empty(kinds, np.int64)
-    values = np.empty(per, np.float32), np.empty(ROWS, np.float32), np.empty(CHANNELS, np.float32)
+    whole = np.empty(per, np.int64), np.empty((SETUPS, 2), np.int64), np.empty(kinds, np.int64)
+    near = np.empty(per, np.float32)
     points = np.empty((SETUPS, SETUP), np.float32), np.zeros((kinds, ROWS * ROOM), np.float32)
     sums = np.empty((kinds, ROOM), np.float32), np.empty((width, 4), np.float32)
-    return (*whole, np.empty((kinds, ROOM), np.int64)), (*values, *points, *sums)
+    return (*whole, np.empty((kinds, ROOM), np.int64)), (near, *points, *sums)
 
 
 class SoftwareCanvas(Canvas):
