@@ -8,18 +8,18 @@ import json
 import math
 import time
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from copy import copy
 from pathlib import Path
 from typing import Any, Unpack
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.block_waiters import BlockWaiter, BlockWaiters, is_control
-from realizer.client.errors import ClientError
+from realizer.client.errors import ClientError, ClosedError
 from realizer.client.message_router import Arrivals, Frame, Playout, Receiver, Router
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
 from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
-from realizer.core.errors import RealizerError
 from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
@@ -45,9 +45,7 @@ class Client:
         self._socket = socket
         self._router = Router()
         self._received = asyncio.Condition()
-        self._ended = False
-        self._close_reason = ""
-        self._fault: Exception | None = None  # why a message could not be read
+        self._end: ClientError | None = None  # why nothing more comes
         self._reader = asyncio.create_task(self._read())
         self._request_lock = asyncio.Lock()
         self._speeches: dict[str, Speech] = {}  # the latest of each id
@@ -137,11 +135,10 @@ class Client:
         """Wait until a condition holds. It is checked after each message of the service.
 
         Raises:
-            ClientError: the connection ended first.
-            RealizerError: a message of the service could not be read, which ends the connection.
+            ClientError: the connection ended first, also because a message could not be read.
         """
         async with self._received:
-            await self._received.wait_for(lambda: condition() or self._ended)
+            await self._received.wait_for(lambda: condition() or self._end is not None)
         if not condition():
             self._check()
 
@@ -213,8 +210,12 @@ class Client:
         return await voice.ended()
 
     async def feedback(self) -> AsyncIterator[Feedback]:
-        """Yield feedback as it arrives, until the connection ends; each message to one iterator only."""
-        with contextlib.suppress(ClientError):
+        """Yield feedback as it arrives, until `close`; each message to one iterator only.
+
+        Raises:
+            ClientError: the connection was lost.
+        """
+        with contextlib.suppress(ClosedError):
             while True:
                 await self.wait_for(lambda: bool(self._router.feedback))
                 yield self._router.feedback.popleft()
@@ -226,6 +227,7 @@ class Client:
             block: an id. Another client may send this block, also later: this waits until one ends.
 
         Raises:
+            ClientError: the connection was lost before that.
             ValueError: nothing was sent, so that there is no last block.
         """
         waiter = self._router.last_sent if block is None else BlockWaiter(block, is_acknowledged=True)
@@ -233,7 +235,7 @@ class Client:
             raise ValueError("block: wanted an id, because no BML was sent last")
         # What was sent is followed already.
         waiters, queue = BlockWaiters() if block is None else BlockWaiters(waiter), self._router.feedback
-        with contextlib.suppress(ClientError):
+        with contextlib.suppress(ClosedError):
             while True:
                 await self.wait_for(lambda: bool(queue) or waiter.is_finished)
                 if not queue:
@@ -245,12 +247,13 @@ class Client:
                     return
 
     def frames(self, stream: str) -> AsyncIterator[Frame]:
-        """Yield frames of a stream as they arrive: WireFrame, or a dictionary if the encoding is JSON.
+        """Yield frames of a stream as they arrive, until `close`: WireFrame, or a dictionary for JSON.
 
         The attribute `stream_info` of a WireFrame describes its stream at that time. It changes when the
         character of a mesh gets another face, and `vertices` depends on it.
 
         Raises:
+            ClientError: the connection was lost.
             ValueError: there is no such stream.
         """
         names = [name for name in STREAMS if name != "feedback"]
@@ -260,7 +263,7 @@ class Client:
 
     async def _frames(self, stream: str) -> AsyncIterator[Frame]:
         queue = self._router.queue_of(stream)
-        with contextlib.suppress(ClientError):
+        with contextlib.suppress(ClosedError):
             while True:
                 await self.wait_for(lambda: bool(queue))
                 yield queue.popleft()
@@ -272,7 +275,7 @@ class Client:
             ahead: how long before their time the service sends frames, 0 to 2 s: longer delays are noticed.
 
         Raises:
-            ClientError: the service refuses the subscription.
+            ClientError: the service refuses the subscription, or the connection was lost.
         """
         return self._play_out("fap", ahead, options)
 
@@ -298,38 +301,35 @@ class Client:
 
     async def _play_out(self, stream: str, ahead: float, options: Mapping[str, Any]) -> AsyncIterator[Any]:
         playout = Playout(ahead)
-        async with self._subscribed(stream, playout, {**options, "ahead": ahead}):
-            while True:
-                while (frame := playout.take(time.monotonic())) is not None:
-                    yield frame
-                due = playout.next_due
-                pause = None if due == math.inf else due - time.monotonic()
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(pause):
-                        await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
+        with contextlib.suppress(ClosedError):
+            async with self._subscribed(stream, playout, {**options, "ahead": ahead}):
+                while True:
+                    while (frame := playout.take(time.monotonic())) is not None:
+                        yield frame
+                    due = playout.next_due
+                    pause = None if due == math.inf else due - time.monotonic()
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(pause):
+                            await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
 
     async def _take(self, stream: str, options: Mapping[str, Any]) -> AsyncIterator[Any]:
         arrivals = Arrivals()
-        async with self._subscribed(stream, arrivals, options):
-            while True:
-                await self.wait_for(lambda: bool(arrivals.frames))
-                yield arrivals.frames.popleft()
+        with contextlib.suppress(ClosedError):
+            async with self._subscribed(stream, arrivals, options):
+                while True:
+                    await self.wait_for(lambda: bool(arrivals.frames))
+                    yield arrivals.frames.popleft()
 
     @contextlib.asynccontextmanager
     async def _subscribed(
         self, stream: str, receiver: Receiver, options: Mapping[str, Any]
     ) -> AsyncIterator[None]:
-        """Subscribe for a receiver, until the connection ends or the block is left."""
+        """Subscribe for a receiver, until the block is left."""
         character, receivers = options.get("character"), self._router.receivers
         receivers[stream, character] = receiver
-        subscribed = False
         try:
             await self.subscribe(stream, **options)
-            subscribed = True
             yield
-        except ClientError:
-            if not subscribed:
-                raise
         finally:
             if receivers.get((stream, character)) is receiver:
                 del receivers[stream, character]
@@ -359,7 +359,8 @@ class Client:
         return await record(self._connect(url), Path(path), bml, fps, look)
 
     async def close(self) -> None:
-        """Close the connection."""
+        """Close the connection, which ends the iterations over feedback and frames."""
+        self._end = self._end or ClosedError()
         await self._socket.close()
         await self._reader
 
@@ -381,21 +382,15 @@ class Client:
                 async with self._received:
                     self._received.notify_all()
         except ConnectionClosed as closed:
-            self._close_reason = closed.rcvd.reason if closed.rcvd is not None else ""
+            reason = closed.rcvd.reason if closed.rcvd is not None else ""
+            end = ClientError("the connection has ended" + (f": {reason}" if reason else ""))
         except Exception as fault:
-            self._fault = fault
+            end = ClientError(f"a message of the service cannot be read: {fault!r}")
             await self._socket.close()
-        finally:
-            self._ended = True
-            async with self._received:
-                self._received.notify_all()
+        self._end = self._end or end
+        async with self._received:
+            self._received.notify_all()
 
     def _check(self) -> None:
-        if self._fault is not None:
-            # No ClientError, which is the usual end of an iteration.
-            text = f"a message of the service cannot be read: {self._fault!r}"
-            raise RealizerError(text) from self._fault
-        if self._ended:
-            raise ClientError(
-                "the connection has ended" + (f": {self._close_reason}" if self._close_reason else "")
-            )
+        if self._end is not None:
+            raise copy(self._end)  # for each caller, with a traceback of its own

@@ -20,3 +20,10 @@ class ClientError(RealizerError):
     def of(cls, error: dict[str, Any]) -> Self:
         """Return the exception for a message `error`."""
         return cls(f"{error.get('where', '')}: {error['message']}".removeprefix(": "), error["code"])
+
+
+class ClosedError(ClientError):
+    """The program has closed the connection itself, which ends its iterations."""
+
+    def __init__(self, text: str = "the connection has ended: it was closed here") -> None:
+        super().__init__(text)

@@ -1,6 +1,7 @@
 """Recording of a block as a film, from the streams of pictures and sound."""
 
 import asyncio
+import contextlib
 import errno
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -65,8 +66,9 @@ async def record(
 
 
 async def _collect(camera: Any, stream: str, kept: list[Any]) -> None:
-    async for frame in camera.frames(stream):
-        kept.append(frame)
+    with contextlib.suppress(ClientError):  # `record` waits too, and raises it
+        async for frame in camera.frames(stream):
+            kept.append(frame)
 
 
 def _film_frames(pictures: Sequence[PictureFrame], start: float, fps: float, count: int) -> Iterator[UInt8]:

@@ -8,7 +8,7 @@ from contextlib import AbstractAsyncContextManager
 from typing import Any, Concatenate, Generic, ParamSpec, Self, TypeVar, Unpack
 
 from realizer.client.async_client import Client
-from realizer.client.errors import ClientError
+from realizer.client.errors import ClosedError
 from realizer.client.speech import OpenSpeech, Speech
 from realizer.client.stream_options import SpeechOptions
 from realizer.client.voice import Voice
@@ -35,11 +35,11 @@ class LoopThread:
         """Run a coroutine, and return its result.
 
         Raises:
-            ClientError: the thread has ended.
+            ClosedError: the thread has ended.
         """
         if self.has_ended:
             work.close()
-            raise ClientError("the connection has ended: it was closed here")
+            raise ClosedError
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
     def each(self, items: AsyncIterator[T]) -> Iterator[T]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import pytest
 
 from bml_schema.feedback import WarningFeedback
 from realizer.client import Client, ClientError, connect
-from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.face.load import load_face
 from realizer.protocol.wire import (
@@ -265,15 +265,41 @@ def test_client_keeps_errors_apart_from_answers() -> None:
     serving(test)
 
 
-def test_client_feedback_ends_with_the_connection() -> None:
+def iterations(client: Client) -> list[AsyncIterator[Any]]:
+    methods = client.feedback, client.aus, client.faps, client.mesh, client.sound
+    return [client.until_end("b"), client.frames("fap"), *(method() for method in methods)]
+
+
+async def rest(items: AsyncIterator[Any]) -> list[Any]:
+    return [item async for item in items]
+
+
+def test_client_iterations_end_when_it_is_closed() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
-            await client._socket.close()
-            assert [f async for f in client.feedback()] == []
-            with pytest.raises(ClientError, match="has ended"):
+            tasks = [asyncio.create_task(rest(items)) for items in iterations(client)]
+            await client.ask("ping")
+            await client.close()
+            await asyncio.gather(*tasks)
+            assert await rest(client.feedback()) == []
+            with pytest.raises(ClientError, match="has ended: it was closed here"):
                 await client.wait_for(lambda: False)
 
     serving(test)
+
+
+def test_client_iterations_raise_when_the_connection_is_lost() -> None:
+    async def run() -> None:
+        settings = Settings(port=0, voice="silent")
+        async with asyncio.timeout(LIMIT), Server(settings) as server, connect(server.url) as client:
+            tasks = [asyncio.create_task(rest(items)) for items in iterations(client)]
+            await client.ask("ping")
+            await server.close()
+            for result in await asyncio.gather(*tasks, return_exceptions=True):
+                assert isinstance(result, ClientError)
+                assert str(result) == "the connection has ended: the service ends"
+
+    asyncio.run(run())
 
 
 @pytest.mark.parametrize(
@@ -313,7 +339,7 @@ def test_client_raises_to_all_that_wait_if_a_message_is_unreadable() -> None:
         waits = client.frames("fap"), client.feedback(), client.until_end("b")
         tasks = [asyncio.ensure_future(anext(wait)) for wait in waits]
         for result in await asyncio.gather(*tasks, return_exceptions=True):
-            assert isinstance(result, RealizerError)
+            assert isinstance(result, ClientError)
             assert "cannot be read: WireError('wanted a header of 16 bytes" in str(result)
         assert not socket.is_open
         await client.close()
