@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
-import json
-import math
-import time
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
-from copy import copy
 from pathlib import Path
 from typing import Any, Unpack
-from urllib.parse import parse_qsl, urlencode, urlsplit
 
 from bml_schema.feedback import BlockProgress, Feedback
 from realizer.client.block_waiters import BlockWaiter, BlockWaiters, is_control
+from realizer.client.connection import Connection, address_of
 from realizer.client.errors import ClientError, ClosedError
-from realizer.client.message_router import Arrivals, Frame, Playout, Receiver, Router
+from realizer.client.message_router import Frame
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
-from realizer.client.voice import Pcm, Timed, Voice, samples_of, timed
-from realizer.protocol.messages.common import ANSWERS
+from realizer.client.subscriptions import play_out, take, take_subscribed
+from realizer.client.voice import Pcm, Timed, Voice, content_of, timed
 from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
@@ -30,25 +25,25 @@ class Client:
 
     Args:
         connect: opens another connection to an address of the same service.
-
-    Attributes:
-        url: the address of the connection.
-        welcome: the first message of the service: session, version, capabilities, limits.
     """
 
     def __init__(
-        self, socket: Any, url: str, connect: Callable[[str], contextlib.AbstractAsyncContextManager[Client]]
+        self, connection: Connection, connect: Callable[[str], contextlib.AbstractAsyncContextManager[Client]]
     ) -> None:
-        self.url = url
+        self._connection = connection
         self._connect = connect
-        self.welcome: Mapping[str, Any] = {}
-        self._socket = socket
-        self._router = Router()
-        self._received = asyncio.Condition()
-        self._end: ClientError | None = None  # why nothing more comes
-        self._reader = asyncio.create_task(self._read())
-        self._request_lock = asyncio.Lock()
+        self._router = connection.router
         self._speeches: dict[str, Speech] = {}  # the latest of each id
+
+    @property
+    def url(self) -> str:
+        """The address of the connection."""
+        return self._connection.url
+
+    @property
+    def welcome(self) -> Mapping[str, Any]:
+        """The first message of the service: session, version, capabilities, limits."""
+        return self._connection.welcome
 
     @property
     def session(self) -> str:
@@ -67,7 +62,7 @@ class Client:
             ClientError: the connection has ended.
         """
         self._router.on_sent(bml)
-        await self._post(bml)
+        await self._connection.post(bml)
 
     async def control(self, /, type: str, **fields: Any) -> None:
         """Send a control message that has no answer, such as `stop` or `scene`; see `errors`.
@@ -75,7 +70,7 @@ class Client:
         Raises:
             ClientError: the connection has ended.
         """
-        await self._post(json.dumps({"type": type, **fields}))
+        await self._connection.control(type, **fields)
 
     async def ask(self, /, type: str, **fields: Any) -> dict[str, Any]:
         """Send a control message and wait for its answer: hello, subscribe, state, ping.
@@ -84,13 +79,7 @@ class Client:
             ClientError: the service answered with an error.
             ValueError: such a message has no answer.
         """
-        if type not in ANSWERS:
-            raise ValueError(f"wanted one of {', '.join(ANSWERS)}, which are answered; got {type}")
-        async with self._request_lock:
-            self._router.expect_answer(type)
-            await self.control(type, **fields)
-            await self.wait_for(lambda: self._router.has_answer)
-            return self._router.answer()
+        return await self._connection.ask(type, **fields)
 
     async def subscribe(self, /, stream: str, **fields: Any) -> dict[str, Any]:
         """Subscribe to a stream, a key of `welcome["capabilities"]["streams"]`, and return its description.
@@ -128,7 +117,7 @@ class Client:
         if block is None:
             got = "a control message, which `control` and `ask` send" if is_control(bml) else "nothing"
             raise ClientError(f"wanted <bml>, got {got}", "refused")
-        await self._post(bml)
+        await self._connection.post(bml)
         return block
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
@@ -137,10 +126,7 @@ class Client:
         Raises:
             ClientError: the connection ended first, also because a message could not be read.
         """
-        async with self._received:
-            await self._received.wait_for(lambda: condition() or self._end is not None)
-        if not condition():
-            self._check()
+        await self._connection.wait_for(condition)
 
     def speech(self, id: str, **opening: Any) -> Speech:
         """Return a speech whose text is streamed: `async with client.speech("s") as speech`.
@@ -151,7 +137,7 @@ class Client:
             id: id of the speech and of its block; other blocks refer to a sync of its text as `ID:ID:sync`.
             opening: composition, character and language, as in the message `speech`.
         """
-        speech = Speech(id, opening, self.control, self.wait_for, self._check)
+        speech = Speech(id, opening, self.control, self.wait_for, self._connection.check)
         speech.earlier, self._speeches[id] = self._speeches.get(id), speech
         self._router.waiters.add(speech.progress)
         return speech
@@ -166,7 +152,7 @@ class Client:
             language: BCP-47 tag of the words; None: the service's.
         """
         fields = opening if language is None else {**opening, "language": language}
-        voice = Voice(rate, fields, self._post, self.control, self.wait_for)
+        voice = Voice(rate, fields, self._connection.post, self.control, self.wait_for)
         self._router.waiters.add(voice.progress)
         return voice
 
@@ -198,27 +184,22 @@ class Client:
             TypeError, ValueError: an argument has another form.
             ClientError: the service refuses it, or the connection has ended.
         """
-        if rate is None and not isinstance(sound, bytes | bytearray | memoryview):
-            raise TypeError(f"sound: wanted the bytes of a sound file, or PCM with a rate, got {type(sound)}")
+        content = content_of(sound, rate)
         voice = self.voice(rate=1 if rate is None else rate, language=language, **opening)
         lists = {"words": words, "phonemes": phonemes, "visemes": visemes}
         described: dict[str, Any] = {name: timed(name, v) for name, v in lists.items() if v is not None}
         described |= {"text": text} if text is not None else {}
         described |= {"viseme_set": viseme_set} if visemes is not None else {}
-        content = bytes(sound) if rate is None else samples_of(sound).astype("<i2").tobytes()
         await voice.clip(content, rate or 0, close=True, **described)
         return await voice.ended()
 
-    async def feedback(self) -> AsyncIterator[Feedback]:
+    def feedback(self) -> AsyncIterator[Feedback]:
         """Yield feedback as it arrives, until `close`; each message to one iterator only.
 
         Raises:
             ClientError: the connection was lost.
         """
-        with contextlib.suppress(ClosedError):
-            while True:
-                await self.wait_for(lambda: bool(self._router.feedback))
-                yield self._router.feedback.popleft()
+        return take(self._connection, self._router.feedback)
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
         """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent.
@@ -259,14 +240,7 @@ class Client:
         names = [name for name in STREAMS if name != "feedback"]
         if stream not in names:
             raise ValueError(f"stream: wanted one of {', '.join(names)}; got {stream!r}")
-        return self._frames(stream)
-
-    async def _frames(self, stream: str) -> AsyncIterator[Frame]:
-        queue = self._router.queue_of(stream)
-        with contextlib.suppress(ClosedError):
-            while True:
-                await self.wait_for(lambda: bool(queue))
-                yield queue.popleft()
+        return take(self._connection, self._router.queue_of(stream))
 
     def faps(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[FapFrame]:
         """Subscribe to FAPs, and yield each frame at its time.
@@ -277,64 +251,27 @@ class Client:
         Raises:
             ClientError: the service refuses the subscription, or the connection was lost.
         """
-        return self._play_out("fap", ahead, options)
+        return play_out(self._connection, "fap", ahead, options)
 
     def aus(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[AUFrame]:
         """Subscribe to action units, and yield each frame at its time, as `faps`."""
-        return self._play_out("au", ahead, options)
+        return play_out(self._connection, "au", ahead, options)
 
     def arkit(self, *, ahead: float = 0.2, **options: Unpack[FrameOptions]) -> AsyncIterator[ArkitFrame]:
         """Subscribe to ARKit's weights and rotations, and yield each frame at its time, as `faps`."""
-        return self._play_out("arkit", ahead, options)
+        return play_out(self._connection, "arkit", ahead, options)
 
     def mesh(self, **options: Unpack[FrameOptions]) -> AsyncIterator[MeshFrame]:
         """Subscribe to the vertices of the face, and yield frames as they arrive. Errors as `faps`."""
-        return self._take("mesh", options)
+        return take_subscribed(self._connection, "mesh", options)
 
     def pictures(self, **options: Unpack[PictureOptions]) -> AsyncIterator[PictureFrame]:
         """Subscribe to pictures, and yield them as they arrive. Errors as `faps`."""
-        return self._take("video", options)
+        return take_subscribed(self._connection, "video", options)
 
     def sound(self, **options: Unpack[SoundOptions]) -> AsyncIterator[SoundFrame]:
         """Subscribe to sound, and yield packets as they arrive, at most 0.1 s ahead. Errors as `faps`."""
-        return self._take("audio", options)
-
-    async def _play_out(self, stream: str, ahead: float, options: Mapping[str, Any]) -> AsyncIterator[Any]:
-        playout = Playout(ahead)
-        with contextlib.suppress(ClosedError):
-            async with self._subscribed(stream, playout, {**options, "ahead": ahead}):
-                while True:
-                    while (frame := playout.take(time.monotonic())) is not None:
-                        yield frame
-                    due = playout.next_due
-                    pause = None if due == math.inf else due - time.monotonic()
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(pause):
-                            await self.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
-
-    async def _take(self, stream: str, options: Mapping[str, Any]) -> AsyncIterator[Any]:
-        arrivals = Arrivals()
-        with contextlib.suppress(ClosedError):
-            async with self._subscribed(stream, arrivals, options):
-                while True:
-                    await self.wait_for(lambda: bool(arrivals.frames))
-                    yield arrivals.frames.popleft()
-
-    @contextlib.asynccontextmanager
-    async def _subscribed(
-        self, stream: str, receiver: Receiver, options: Mapping[str, Any]
-    ) -> AsyncIterator[None]:
-        """Subscribe for a receiver, until the block is left."""
-        character, receivers = options.get("character"), self._router.receivers
-        receivers[stream, character] = receiver
-        try:
-            await self.subscribe(stream, **options)
-            yield
-        finally:
-            if receivers.get((stream, character)) is receiver:
-                del receivers[stream, character]
-                with contextlib.suppress(ClientError):
-                    await self.control("unsubscribe", stream=stream, character=character)
+        return take_subscribed(self._connection, "audio", options)
 
     async def film(self, /, path: str | Path, bml: str, *, fps: float = 25, **look: Any) -> BlockProgress:
         """Play BML and save its last block as a film with sound (.mp4, .webm).
@@ -353,44 +290,9 @@ class Client:
         from realizer.client.record import record
 
         # Another connection, so that the subscriptions of this one stay as they are.
-        parts = urlsplit(self.url)
-        query = [(name, value) for name, value in parse_qsl(parts.query) if name not in ("session", "seen")]
-        url = parts._replace(query=urlencode([*query, ("session", self.session)])).geturl()
+        url = address_of(self.url, session=self.session)
         return await record(self._connect(url), Path(path), bml, fps, look)
 
     async def close(self) -> None:
         """Close the connection, which ends the iterations over feedback and frames."""
-        self._end = self._end or ClosedError()
-        await self._socket.close()
-        await self._reader
-
-    async def _post(self, message: str | bytes) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        try:
-            await self._socket.send(message)
-        except ConnectionClosed:
-            await self.wait_for(lambda: False)  # raises once the reader knows the reason
-
-    async def _read(self) -> None:
-        from websockets.exceptions import ConnectionClosed
-
-        try:
-            while True:
-                message = await self._socket.recv()
-                self._router.receive(message)
-                async with self._received:
-                    self._received.notify_all()
-        except ConnectionClosed as closed:
-            reason = closed.rcvd.reason if closed.rcvd is not None else ""
-            end = ClientError("the connection has ended" + (f": {reason}" if reason else ""))
-        except Exception as fault:
-            end = ClientError(f"a message of the service cannot be read: {fault!r}")
-            await self._socket.close()
-        self._end = self._end or end
-        async with self._received:
-            self._received.notify_all()
-
-    def _check(self) -> None:
-        if self._end is not None:
-            raise copy(self._end)  # for each caller, with a traceback of its own
+        await self._connection.close()

@@ -157,6 +157,15 @@ def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:
     return found
 
 
+def content_of(sound: Pcm, rate: int | None) -> bytes:
+    """Return a sound file, or with a rate PCM, as it is sent. Errors as of `samples_of`."""
+    if rate is not None:
+        return samples_of(sound).astype("<i2").tobytes()
+    if not isinstance(sound, bytes | bytearray | memoryview):
+        raise TypeError(f"sound: wanted the bytes of a sound file, or PCM with a rate, got {type(sound)}")
+    return bytes(sound)
+
+
 def samples_of(pcm: Pcm) -> Int16:
     """Return mono sound as int16 samples.
 

@@ -1,75 +1,58 @@
-"""Opening of connections: versions, tokens and refusals of the real service."""
+"""The connection of a client: its loss, and messages that it cannot read."""
 
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 import pytest
+from websockets.asyncio.server import ServerConnection, serve
 
 from realizer.client import ClientError, connect
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-from tests.realizer.client.service import LIMIT, WAIT, serving
+from tests.realizer.client.service import LIMIT, WAIT
 
 
-def test_connect_refuses_a_service_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.client.connection.PROTOCOL", 2)
-
-    async def test(url: str) -> None:
-        with pytest.raises(ClientError, match="wanted version 1 of the protocol, got 2") as caught:
-            async with connect(url):
-                pass
-        assert caught.value.code == "version"
-
-    serving(test)
-
-
-def test_connect_sends_its_token() -> None:
-    secret = "a-token-of-many-letters-and-0123456789"
-
+@pytest.mark.parametrize(
+    "say",
+    [
+        lambda client: client.send(WAIT.format("b")),
+        lambda client: client.play(WAIT.format("b")),
+        lambda client: client.control("stop"),
+        lambda client: client.ask("ping"),
+        lambda client: client.subscribe("fap"),
+    ],
+)
+def test_connection_raises_its_own_error_after_the_end_of_the_connection(say: Any) -> None:
     async def run() -> None:
-        settings = Settings(port=0, voice="silent", token=secret)
-        async with asyncio.timeout(LIMIT), Server(settings) as server:
-            async with connect(server.url, token=secret) as client:
-                assert (await client.play(WAIT.format("b"))).id == "b:end"
-            for token in (None, "another"):
-                with pytest.raises(ClientError, match="token"):
-                    async with connect(server.url, token=token):
-                        pass
+        settings = Settings(port=0, voice="silent")
+        async with asyncio.timeout(LIMIT), Server(settings) as server, connect(server.url) as client:
+            await server.close()
+            with pytest.raises(ClientError, match="the connection has ended: the service ends") as caught:
+                await say(client)
+            assert caught.value.code == "connection"
 
     asyncio.run(run())
 
 
-def test_connect_raises_the_refusal_of_an_address() -> None:
-    async def test(url: str) -> None:
-        for bad, says in (
-            (f"{url}?session=a b", "session: wanted 1..64 letters"),
-            (
-                f"{url}?session=a&seen=abc",
-                "seen: wanted the number of the last feedback that came, got 'abc'",
-            ),
-            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws, /check, /studio, /label"),
-            (url.replace("ws:", "http:"), "http"),
-        ):
-            with pytest.raises(ClientError, match=says):
-                async with connect(bad.replace(" ", "%20")):
-                    pass
+def test_connection_raises_to_all_that_wait_if_a_message_is_unreadable() -> None:
+    async def answer(socket: ServerConnection) -> None:
+        await socket.recv()
+        await socket.send('{"type":"welcome","version":1,"session":"a","time":0,"seq":0}')
+        await socket.recv()
+        await socket.send(b"no frame")
+        await socket.wait_closed()
 
-    serving(test)
-
-
-def test_connect_raises_os_error_where_nothing_listens() -> None:
     async def run() -> None:
-        async with Server(Settings(port=0, voice="silent")) as server:
-            url = server.url
-        with pytest.raises(OSError, match="Connect") as caught:
-            async with connect(url):
-                pass
-        assert str(caught.value).endswith(f": wanted a service at {url}; `realizer serve` starts one")
+        async with serve(answer, "127.0.0.1", 0) as server:
+            port = next(iter(server.sockets)).getsockname()[1]
+            async with connect(f"ws://127.0.0.1:{port}/ws") as client:
+                waits = client.frames("fap"), client.feedback(), client.until_end("b")
+                tasks = [asyncio.ensure_future(anext(wait)) for wait in waits]
+                await client.send(WAIT.format("b"))
+                for result in await asyncio.gather(*tasks, return_exceptions=True):
+                    assert isinstance(result, ClientError)
+                    assert "cannot be read: WireError('wanted a header of 16 bytes" in str(result)
 
-    asyncio.run(run())
-
-
-def test_connect_refuses_what_is_no_address() -> None:
-    with pytest.raises(TypeError, match="url: wanted a string"):
-        connect(8765)  # type: ignore[arg-type]
+    asyncio.run(asyncio.wait_for(run(), LIMIT))
