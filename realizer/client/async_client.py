@@ -21,17 +21,13 @@ from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, Pic
 
 
 class Client:
-    """An open connection, which `connect` returns. Several tasks may use it at once.
-
-    Args:
-        connect: opens another connection to an address of the same service.
-    """
+    """An open connection, which `connect` returns. Several tasks may use it at once."""
 
     def __init__(
         self, connection: Connection, connect: Callable[[str], contextlib.AbstractAsyncContextManager[Client]]
     ) -> None:
         self._connection = connection
-        self._connect = connect
+        self._connect = connect  # opens another connection to an address of the same service
         self._router = connection.router
         self._speeches: dict[str, Speech] = {}  # the latest of each id
 
@@ -43,7 +39,7 @@ class Client:
     @property
     def welcome(self) -> Mapping[str, Any]:
         """The first message of the service: session, version, capabilities, limits."""
-        return self._connection.welcome
+        return self._router.welcome
 
     @property
     def session(self) -> str:
@@ -193,13 +189,16 @@ class Client:
         await voice.clip(content, rate or 0, close=True, **described)
         return await voice.ended()
 
-    def feedback(self) -> AsyncIterator[Feedback]:
+    async def feedback(self) -> AsyncIterator[Feedback]:
         """Yield feedback as it arrives, until `close`; each message to one iterator only.
 
         Raises:
             ClientError: the connection was lost.
         """
-        return take(self._connection, self._router.feedback)
+        with contextlib.suppress(ClosedError):
+            while True:
+                await self.wait_for(lambda: bool(self._router.feedback))
+                yield self._router.take_feedback()
 
     async def until_end(self, block: str | None = None) -> AsyncIterator[Feedback]:
         """Yield feedback up to the end, or the refusal, of a block: by default of the last one sent.
@@ -220,8 +219,9 @@ class Client:
             while True:
                 await self.wait_for(lambda: bool(queue) or waiter.is_finished)
                 if not queue:
+                    waiter.check()
                     return  # its end was taken from the queue before
-                feedback = queue.popleft()
+                feedback = self._router.take_feedback()
                 yield feedback
                 waiters.on_feedback(feedback)
                 if feedback is waiter.last:

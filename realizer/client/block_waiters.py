@@ -1,6 +1,7 @@
 """Waiters for the blocks that a client has sent: which feedback starts, refuses and ends each of them."""
 
 import re
+from collections.abc import Iterable
 from itertools import repeat
 from typing import Any
 
@@ -37,6 +38,7 @@ class BlockWaiter:
         is_sent: whether the service knows of it.
         start: when the block started, seconds on the session clock, or None.
         last: the feedback that ended it, or None.
+        fault: an error instead of its end, as the message `error`, or None.
     """
 
     def __init__(
@@ -49,11 +51,20 @@ class BlockWaiter:
         self.is_sent = True
         self.start: float | None = None
         self.last: BlockProgress | WarningFeedback | None = None
+        self.fault: dict[str, Any] | None = None
         self._may_lack_id = may_lack_id
 
     @property
     def is_finished(self) -> bool:
-        return self.last is not None
+        return self.last is not None or self.fault is not None
+
+    def on_lost(self) -> None:
+        """Handle the loss of the connection, by which the service knew the block."""
+
+    def check(self) -> None:
+        """Raise ClientError if there is an error instead of the end of the block."""
+        if self.fault is not None:
+            raise ClientError.of(self.fault)
 
     def is_refused_by(self, warning: WarningFeedback) -> bool:
         """Return whether a warning may be the refusal of this block."""
@@ -79,8 +90,9 @@ class BlockWaiter:
         """Return the feedback at the end of the block.
 
         Raises:
-            ClientError: the block was refused.
+            ClientError: the block was refused, or its end is not known.
         """
+        self.check()
         if isinstance(self.last, BlockProgress):
             return self.last
         assert self.last is not None
@@ -154,6 +166,20 @@ class BlockWaiters:
     def on_error(self, error: dict[str, Any]) -> None:
         """Handle an error about a message without an answer; of several of one id, the newest has sent it."""
         any(waiter.on_error(error) for waiter in reversed(self._waiters) if waiter.is_sent)
+        self._drop_finished()
+
+    def on_lost(self) -> list[BlockWaiter]:
+        """Handle the loss of the connection, and return the waiters for what was sent and has not ended."""
+        lost = [waiter for waiter in self._unfinished() if waiter.is_sent]
+        for waiter in lost:
+            waiter.on_lost()
+        return lost
+
+    def fail(self, waiters: Iterable[BlockWaiter], fault: dict[str, Any]) -> None:
+        """End waiters by an error; those that have ended stay as they are."""
+        for waiter in waiters:
+            if not waiter.is_finished:
+                waiter.fault = fault
         self._drop_finished()
 
     def _drop_finished(self) -> None:

@@ -3,78 +3,104 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
-from collections.abc import Callable, Mapping
+import logging
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from errno import ECONNREFUSED
 from typing import Any
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from realizer.client.errors import ClientError, ClosedError
+from realizer.client.block_waiters import BlockWaiter
+from realizer.client.errors import ClientError, ClosedError, LostError
 from realizer.client.message_router import Router
 from realizer.protocol.messages.common import ANSWERS, PROTOCOL
+
+# Pauses before attempts to connect again, each twice as long as the last, and how long attempts go on.
+PAUSE, LONGEST_PAUSE = 0.25, 4.0  # s
+PATIENCE = 60.0  # s; a service keeps a session without clients as long
+REFUSED = 1008  # the code with which a service closes a connection whose token is wrong or has expired
+_LOG = logging.getLogger("realizer.client")
 
 
 class Connection:
     """A connection to a service, which `open` opens.
 
+    If it is lost, it is opened again: the service sends the feedback that was missed, and subscriptions and
+    the pending request are sent again. A session without a name ends with its connection.
+
     Args:
         url: address of the service's WebSocket.
         token: of the service, if it requires one.
+        reconnect: whether to open it again.
 
     Attributes:
         router: what has arrived.
-        welcome: the first message of the service.
     """
 
-    def __init__(self, url: str, token: str | None = None) -> None:
+    def __init__(self, url: str, token: str | None = None, *, reconnect: bool = True) -> None:
         self.url = url
         self.router = Router()
-        self.welcome: Mapping[str, Any] = {}
-        self._token = token
+        self._token = {} if token is None else {"token": token}
+        self._returns = reconnect and bool(dict(parse_qsl(urlsplit(url).query)).get("session"))
         self._socket: Any = None
+        self._is_open = False
         self._received = asyncio.Condition()
         self._end: ClientError | None = None  # why nothing more comes
         self._reader: asyncio.Task[None] | None = None
         self._request_lock = asyncio.Lock()
+        self._request: str | None = None  # a message that was sent and is not answered
+        # stream, character and view -> the message
+        self._subscriptions: dict[tuple[Any, ...], str] = {}
+        self._interrupted: list[BlockWaiter] = []  # what was waited for when the connection was lost
 
     async def open(self) -> None:
         """Connect. Errors as of `connect`."""
-        self._socket = await _dial(self.url)
+        await self._join(self.url)
         self._reader = asyncio.create_task(self._read())
-        token = {} if self._token is None else {"token": self._token}
-        try:
-            self.welcome = await self.ask("hello", version=PROTOCOL, **token)
-        except BaseException:
-            await self.close()
-            raise
 
     async def post(self, message: str | bytes) -> None:
-        """Send a message.
+        """Send a message as soon as the connection is open.
 
         Raises:
             ClientError: the connection has ended.
         """
         from websockets.exceptions import ConnectionClosed
 
-        try:
-            await self._socket.send(message)
-        except ConnectionClosed:
-            await self.wait_for(lambda: False)  # raises once the reader knows the reason
+        while True:
+            await self.wait_for(lambda: self._is_open)
+            socket = self._socket
+            try:
+                return await socket.send(message)  # type: ignore[no-any-return]
+            except ConnectionClosed:  # the reader knows why
+                self._is_open &= socket is not self._socket
 
     async def control(self, type: str, **fields: Any) -> None:
         """Send a control message. Errors as of `post`."""
+        if type == "unsubscribe":
+            self._subscriptions.pop(_key(fields), None)
+            if not self._is_open:  # the next connection will not have it
+                return
         await self.post(json.dumps({"type": type, **fields}))
 
     async def ask(self, type: str, **fields: Any) -> dict[str, Any]:
         """Send a control message and wait for its answer. Errors as of `Client.ask`."""
         if type not in ANSWERS:
             raise ValueError(f"wanted one of {', '.join(ANSWERS)}, which are answered; got {type}")
+        message = json.dumps({"type": type, **fields})
         async with self._request_lock:
             self.router.expect_answer(type)
-            await self.control(type, **fields)
-            await self.wait_for(lambda: self.router.has_answer)
-            return self.router.answer()
+            await self.post(message)
+            self._request = message
+            try:
+                await self.wait_for(lambda: self.router.has_answer)
+            finally:
+                self._request = None
+            answer = self.router.answer()
+        if type == "subscribe":
+            self._subscriptions[_key(fields)] = message
+        return answer
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Wait until a condition holds. It is checked after each message of the service.
@@ -97,26 +123,100 @@ class Connection:
         self._end = self._end or ClosedError()
         await self._socket.close()
         if self._reader is not None:
-            await self._reader
+            self._reader.cancel()
+            await asyncio.wait([self._reader])
 
     async def _read(self) -> None:
-        from websockets.exceptions import ConnectionClosed
-
         try:
             while True:
-                message = await self._socket.recv()
-                self.router.receive(message)
-                async with self._received:
-                    self._received.notify_all()
-        except ConnectionClosed as closed:
-            reason = closed.rcvd.reason if closed.rcvd is not None else ""
-            end = ClientError("the connection has ended" + (f": {reason}" if reason else ""))
+                try:
+                    await self._receive()
+                except LostError as lost:
+                    self._is_open = False
+                    if self._end is not None or not self._returns:
+                        raise
+                    await self._reconnect(lost)
+                await self._notify()
+        except ClientError as end:
+            self._end = self._end or end
         except Exception as fault:
-            end = ClientError(f"a message of the service cannot be read: {fault!r}")
+            self._end = self._end or ClientError(f"a message of the service cannot be read: {fault!r}")
+        finally:
+            self._is_open = False
             await self._socket.close()
-        self._end = self._end or end
+            await self._notify()
+
+    async def _notify(self) -> None:
         async with self._received:
             self._received.notify_all()
+
+    async def _receive(self) -> None:
+        with _closing():
+            while True:
+                self.router.receive(await self._socket.recv())
+                await self._notify()
+
+    async def _reconnect(self, lost: LostError) -> None:
+        """Open the connection again.
+
+        Raises:
+            ClientError: the service refuses it, or was not there for PATIENCE seconds.
+        """
+        _LOG.warning("%s: connecting again", lost)
+        self._interrupted = self.router.waiters.on_lost()
+        session = self.router.welcome["session"]
+        pause, waited = PAUSE, 0.0
+        while True:
+            await asyncio.sleep(pause)
+            waited, pause = waited + pause, min(2 * pause, LONGEST_PAUSE)
+            try:
+                return await self._join(address_of(self.url, session=session, seen=str(self.router.seen)))
+            except (OSError, LostError) as error:
+                if waited >= PATIENCE:
+                    words = f"{lost}, and there was no new one for {waited:.2g} s: {error}"
+                    raise ClientError(words) from None
+
+    async def _join(self, url: str) -> None:
+        """Open a WebSocket, and restore what another one had."""
+        socket = await _dial(url)
+        try:
+            with _closing():
+                await socket.send(json.dumps({"type": "hello", "version": PROTOCOL, **self._token}))
+                before = self.router.welcome
+                while self.router.welcome is before:  # missed feedback comes first
+                    message = await socket.recv()
+                    reply = json.loads(message) if isinstance(message, str) and message[0] == "{" else {}
+                    if reply.get("type") == "error" and str(reply.get("where")).startswith("hello"):
+                        raise ClientError.of(reply)
+                    if reply.get("type") == "gap":
+                        self.router.on_gap(self._interrupted)
+                    self.router.receive(message)
+                self.router.on_return(self._interrupted)
+                self._socket, self._is_open = socket, True
+                for text in ([self._request] if self._request else []) + [*self._subscriptions.values()]:
+                    await socket.send(text)
+        except BaseException:
+            self._is_open = False
+            await socket.close()
+            raise
+
+
+def _key(subscription: Mapping[str, Any]) -> tuple[Any, ...]:
+    return tuple(subscription.get(name) for name in ("stream", "character", "view"))
+
+
+@contextlib.contextmanager
+def _closing() -> Iterator[None]:
+    """Turn the end of a WebSocket into LostError, or ClientError if the service wants no other one."""
+    from websockets.exceptions import ConnectionClosed
+
+    try:
+        yield
+    except ConnectionClosed as closed:
+        reason = f": {closed.rcvd.reason}" if closed.rcvd is not None and closed.rcvd.reason else ""
+        is_refused = closed.rcvd is not None and closed.rcvd.code == REFUSED
+        kind = ClientError if is_refused else LostError
+        raise kind(f"the connection has ended{reason}") from None
 
 
 def address_of(url: str, **fields: str) -> str:
@@ -136,9 +236,11 @@ async def _dial(url: str) -> Any:
     except InvalidStatus as refused:
         status, body = refused.response.status_code, bytes(refused.response.body)
         text = body.decode("utf-8", "replace").strip() or f"the service answers with the status {status}"
+        if status >= 500 or status == 429:  # a full or overloaded service
+            raise LostError(text) from None
         raise ClientError(text, "token" if status in (401, 403) else "connection") from None
     except WebSocketException as error:
-        raise ClientError(f"{url}: {error}") from None
+        raise LostError(f"{url}: {error}") from None
     except OSError as error:
         words = f"{error.strerror or error}: wanted a service at {url}; `realizer serve` starts one"
         raise OSError(error.errno or ECONNREFUSED, words) from error

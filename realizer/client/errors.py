@@ -27,3 +27,7 @@ class ClosedError(ClientError):
 
     def __init__(self, text: str = "the connection has ended: it was closed here") -> None:
         super().__init__(text)
+
+
+class LostError(ClientError):
+    """The connection was lost, or was not opened, for a reason that may pass."""

@@ -5,6 +5,7 @@ import logging
 import math
 import time
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -28,6 +29,9 @@ class Receiver(Protocol):
 
     def receive(self, message: WireFrame[Any], now: float) -> None: ...
 
+    def restart(self) -> None:
+        """Handle a new connection, whose frames may have other numbers and times."""
+
 
 class Arrivals:
     """A receiver that keeps the newest frames as they arrive."""
@@ -38,6 +42,9 @@ class Arrivals:
     def receive(self, message: WireFrame[Any], now: float) -> None:
         self.frames.append(message)
 
+    def restart(self) -> None:
+        pass
+
 
 class Router:
     """The queues of messages that have arrived, and the pending request.
@@ -47,11 +54,16 @@ class Router:
         errors: errors about messages without an answer, and of video streams that ended.
         waiters: of the blocks and speeches that were sent and have not ended.
         last_sent: the waiter for the last block of the last text.
+        feedback: that was not taken, and an error where some is missing.
+        welcome: the last one.
+        seen: number of the last feedback.
     """
 
     def __init__(self) -> None:
         self.receivers: dict[tuple[str, str | None], Receiver] = {}
-        self.feedback: deque[Feedback] = deque(maxlen=MAX_FEEDBACK)
+        self.feedback: deque[Feedback | ClientError] = deque(maxlen=MAX_FEEDBACK)
+        self.welcome: dict[str, Any] = {}
+        self.seen = 0
         self.frames: dict[str, deque[Frame]] = {}
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
         self.waiters = BlockWaiters()
@@ -79,6 +91,7 @@ class Router:
         else:
             feedback = parse_feedback(message)
             self.feedback.append(feedback)
+            self.seen = feedback.seq or self.seen
             if isinstance(feedback, WarningFeedback):
                 _LOG.warning("%s: %s: %s", feedback.id, feedback.type, feedback.text)
             self.waiters.on_feedback(feedback)
@@ -89,6 +102,37 @@ class Router:
         self.waiters.add(*added)
         self.last_sent = added[-1] if added else None
         return self.last_sent
+
+    def take_feedback(self) -> Feedback:
+        """Return the next feedback.
+
+        Raises:
+            ClientError: some is missing before it.
+        """
+        feedback = self.feedback.popleft()
+        if isinstance(feedback, ClientError):
+            raise feedback
+        return feedback
+
+    def on_gap(self, interrupted: Sequence[BlockWaiter]) -> None:
+        """Handle that a new connection will not get all feedback since the last one was lost.
+
+        Args:
+            interrupted: what was waited for then.
+        """
+        words = "the connection was lost, and the service no longer has the feedback that followed"
+        fault = {"code": "gap", "message": f"{words}: the session has begun anew, or was silent for too long"}
+        self.waiters.fail(interrupted, fault)
+        self.feedback.append(ClientError.of(fault))
+
+    def on_return(self, interrupted: Sequence[BlockWaiter]) -> None:
+        """Handle that a new connection has got the feedback that was missed."""
+        words = "the connection was lost before the service acknowledged the block: send it again"
+        lost = [waiter for waiter in interrupted if not (waiter.is_acknowledged or waiter.is_finished)]
+        self.waiters.fail(lost, {"code": "connection", "message": words})
+        self._streams.clear()
+        for receiver in self.receivers.values():
+            receiver.restart()
 
     def queue_of(self, stream: str) -> deque[Frame]:
         """Return the newest messages of a stream; all of `schedule`, as each is the difference to others."""
@@ -110,6 +154,8 @@ class Router:
 
     def _reply(self, reply: dict[str, Any]) -> None:
         request = self._request
+        if reply["type"] == "welcome":
+            self.welcome, self.seen = reply, reply["seq"]
         if reply["type"] in ("subscribed", "changed"):
             key = reply["stream"], reply.get("index", 0)
             known = self._streams.get(key, {}) if reply["type"] == "changed" else {}
@@ -172,6 +218,11 @@ class Playout:
         while self._offsets and self._offsets[-1][1] >= offset:
             self._offsets.pop()
         self._offsets.append((now, offset))
+
+    def restart(self) -> None:
+        self._frames.clear()
+        self._offsets.clear()
+        self._next = 0
 
     @property
     def next_due(self) -> float:

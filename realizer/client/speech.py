@@ -26,14 +26,17 @@ class SpeechProgress(BlockWaiter):
     Attributes:
         is_closed: whether its last message was sent.
         points: sync of the text -> when it was spoken, seconds on the session clock.
-        fault: the error about its messages, or None: a closed speech of that id is still being spoken.
     """
 
     def __init__(self, id: str) -> None:
         super().__init__(id)
         self.is_sent = self.is_closed = False
         self.points: dict[str, float] = {}
-        self.fault: dict[str, Any] | None = None
+
+    def on_lost(self) -> None:
+        if not self.is_closed:  # the service closes it
+            words = "the connection was lost while the speech was open: what had arrived of it is spoken"
+            self.fault = self.fault or {"code": "connection", "id": self.block, "message": words}
 
     def continues(self, other: BlockWaiter) -> bool:
         if not isinstance(other, SpeechProgress) or other is self or other.is_closed:
@@ -53,15 +56,6 @@ class SpeechProgress(BlockWaiter):
             self.fault = self.fault or error
         return self.fault is not None and error.get("id") == self.block
 
-    def check(self) -> None:
-        """Raise ClientError if the service has refused the messages."""
-        if self.fault is not None:
-            raise ClientError.of(self.fault)
-
-    @property
-    def is_finished(self) -> bool:
-        return self.last is not None or self.fault is not None
-
     def point(self, sync: str) -> float:
         """Return when a sync was spoken.
 
@@ -74,15 +68,6 @@ class SpeechProgress(BlockWaiter):
                 self.end()
             raise ClientError(f"the speech {self.block} has ended without a sync {sync!r}")
         return self.points[sync]
-
-    def result(self) -> BlockProgress:
-        """Return the feedback at the end of the speech.
-
-        Raises:
-            ClientError: it was refused.
-        """
-        self.check()
-        return self.end()
 
 
 class OpenSpeech(ABC):
@@ -129,7 +114,7 @@ class OpenSpeech(ABC):
             ClientError: the speech was refused, or the connection has ended.
         """
         await self._wait(lambda: self.progress.is_finished)
-        return self.progress.result()
+        return self.progress.end()
 
     async def __aenter__(self) -> Self:
         return self
