@@ -14,6 +14,7 @@ UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0
 EYE_DISTANCES = (0.048, 0.078)  # m; range for people from six years on
 USUAL_EYE_DISTANCE = 0.062  # m
 MIN_COSINE = np.cos(np.radians(20))  # a head that is nearer to the file's axes is aligned with them
+SAME_PLACE = 1e-3  # of the head's size; places that are nearer are the same
 UPPER = ("brow", "eye")
 LOWER = ("mouth",)
 # Shapes that show where the eyes are; the first that exists is used.
@@ -37,7 +38,7 @@ def pose_of(surface: Surface) -> Pose:
     """Return the pose of a head, found from the vertices that its shapes move.
 
     Raises:
-        FaceError: there is no shape of each eye.
+        FaceError: there is no shape of each eye, or shapes of different places move the same vertices.
     """
     centres = {name: surface.centre([move]) for name, move in surface.moves.items() if move.any()}
     pairs = [
@@ -45,6 +46,11 @@ def pose_of(surface: Surface) -> Pose:
         for name in centres
         if name.endswith("Left") and len(name) > len("mouthLeft") and name[:-4] + "Right" in centres
     ]
+    if _eyes(centres, False)[0] is None:
+        raise FaceError(
+            "wanted a shape of each eye, such as eyeBlinkLeft and eyeBlinkRight, got none: where the face is "
+            "cannot be told; export the head with its ARKit shapes"
+        )
     across = np.sum([a - b for a, b in pairs], axis=0) if pairs else np.zeros(3)
     high = [place for name, place in centres.items() if name.startswith(UPPER)]
     low = [place for name, place in centres.items() if name.startswith(LOWER)]
@@ -64,12 +70,9 @@ def pose_of(surface: Surface) -> Pose:
     if swapped:
         notes.append("its shapes' left and right are the viewer's: exchanged")
     left, right = _eyes(centres, swapped)
-    apart = float(np.linalg.norm((left - right) @ turn.T[:, :1])) if left is not None else 0.0
-    if left is None or apart <= 0:
-        raise FaceError(
-            "wanted a shape of each eye, such as eyeBlinkLeft and eyeBlinkRight, got none: where the face is "
-            "cannot be told; export the head with its ARKit shapes"
-        )
+    apart = float(np.linalg.norm((left - right) @ turn.T[:, :1]))
+    if apart <= SAME_PLACE * np.ptp(surface.vertices, axis=0).max():
+        raise _same_place("those of the left and the right eye")
     unit = next(
         (name for name, size in UNITS.items() if EYE_DISTANCES[0] <= apart * size <= EYE_DISTANCES[1]), ""
     )
@@ -101,11 +104,23 @@ def _eyes(centres: dict[str, Float64], swapped: bool) -> Any:
     return None, None
 
 
+def _same_place(shapes: str) -> FaceError:
+    return FaceError(
+        f"wanted shapes that move different places of the face, got {shapes} that move the same: where the "
+        "face is cannot be told; export the head with its own ARKit shapes"
+    )
+
+
 def _turn(
     surface: Surface, across: Float64, up: Float64, centres: dict[str, Float64]
 ) -> tuple[Float64, bool]:
+    least = SAME_PLACE * np.ptp(surface.vertices, axis=0).max()
+    if np.linalg.norm(across) <= least:
+        raise _same_place("left and right ones")
     x = across / np.linalg.norm(across)
     y = up - (up @ x) * x
+    if np.linalg.norm(y) <= least:
+        raise _same_place("those of eyes or brows and of the mouth")
     y /= np.linalg.norm(y)
     z = np.cross(x, y)
     # Moving vertices are in front of the head's centre at their height.
