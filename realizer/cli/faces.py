@@ -214,19 +214,24 @@ def import_(head: Path, name: str | None, output: Path | None) -> None:
 @click.argument(
     "names", nargs=-1, metavar="[NAME | FOLDER | HEAD.glb]...", shell_complete=options.completing_faces
 )
-def check(names: tuple[str, ...]) -> int:
+@option("--avatar", "Check files as those of `realize --avatar` and <bml-face>.", is_flag=True)
+def check(names: tuple[str, ...], avatar: bool) -> int:
     """Print every fault of face folders; without a name, of all of them.
 
-    For a GLB or glTF head, prints what `realizer faces import` would find.
+    For a GLB or glTF head, prints what `realizer faces import` would find. A face needs more than an avatar,
+    as FAPs and action units move it; files that end in .vrm are always checked as avatars.
     """
     from realizer.face.load import face_folders, folder_of
     from realizer.facebuild.check import check_face
 
+    if avatar and not names:
+        raise click.UsageError("--avatar: wanted a .glb or .vrm file")
     status = 0
     for name in names or face_folders():
         path = Path(name)
-        if path.suffix.lower() in HEADS:
-            faults = _inspect_head(path)
+        is_avatar = avatar or path.suffix.lower() == ".vrm"
+        if is_avatar or path.suffix.lower() in HEADS:
+            faults = _inspect(path, is_avatar=is_avatar)
         elif path.name != name and path.is_dir():
             folder = path.resolve()
             faults = check_face(folder.name, folder.parent)
@@ -241,13 +246,16 @@ def check(names: tuple[str, ...]) -> int:
     return status
 
 
-def _inspect_head(head: Path) -> tuple[str, ...]:
+def _inspect(path: Path, *, is_avatar: bool) -> tuple[str, ...]:
     from realizer.facebuild.arkit.importer import inspect_head
+    from realizer.outputs.avatar import read_avatar
 
     try:
-        for line in inspect_head(head).lines:
+        for line in (read_avatar(path) if is_avatar else inspect_head(path)).lines:
             click.echo(line)
-    except FaceError as error:
+    except OSError as error:
+        return (f"{path}: {error.strerror}",)
+    except (FaceError, ValueError) as error:
         return (str(error),)
     return ()
 

@@ -12,6 +12,7 @@ from realizer.core.array_types import Float64
 from realizer.face.glb_file import read_glb
 from realizer.tables import toml_table
 from realizer.tables.arkit_names import canonical
+from realizer.tables.arkit_names import shapes as arkit_shapes
 
 # Letters of a node's name behind a prefix such as "mixamorig:" -> its bone, in VRM's spelling.
 BONES = {
@@ -21,6 +22,13 @@ BONES = {
 }  # fmt: skip
 BALL = re.compile(r"eye(?!.*(lash|brow|lid|shadow|occlusion))", re.IGNORECASE)
 LISTED = 8  # names in a message
+# The shapes without which a face does not seem to speak or to live.
+MOST_SEEN = (
+    "jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "mouthFunnel", "mouthPucker", "mouthClose", "mouthSmileLeft",
+    "mouthSmileRight",
+)  # fmt: skip
+DRACO = "KHR_draco_mesh_compression"
+UNPACK = "unpack them with npx @gltf-transform/cli copy"
 Bind = tuple[int, int, float]  # node, number of a morph target, its weight when the shape has weight 1
 
 
@@ -46,17 +54,36 @@ class Avatar:
     rest: Mapping[int, tuple[Float64, Float64]]
     faces_back: bool
 
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """ARKit's shapes that nothing shows, the most seen first; none if it has VRM's expressions alone."""
+        turned = self.bones.keys() >= {"leftEye", "rightEye"}
+        names = dict.fromkeys((*MOST_SEEN, *arkit_shapes())) if self.shapes else ()
+        lost = (name for name in names if name not in self.shapes)
+        return tuple(name for name in lost if not (turned and name.startswith("eyeLook")))
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What was found and what is missing, in words."""
+        found = [f"{len(self.shapes)} of ARKit's {len(arkit_shapes())} shapes"] if self.shapes else []
+        found += [f"VRM's expressions {', '.join(self.expressions)}"] if self.expressions else []
+        found += [f"bones of {', '.join(self.bones)}"] if self.bones else []
+        missing = (f"missing: {', '.join(self.missing)}",) if self.missing else ()
+        return (f"found: {'; '.join(found)}", *missing)
+
 
 def read_avatar(path: Path | str) -> Avatar:
     """Read a .glb or .vrm file whose morph targets have ARKit's names, or VRM's expressions.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no GLB file, is broken, or has neither.
+        ValueError: it is no GLB file, is broken, has neither, or has meshes packed with Draco.
     """
     raw = Path(path).read_bytes()
     try:
-        avatar, names = _avatar(*read_glb(raw))
+        document, data = read_glb(raw)
+        _check_meshes(document, len(data))
+        avatar, names = _avatar(document, data)
     except (KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         fault = f"{type(error).__name__}: {error}"
         raise ValueError(f"avatar: {path}: wanted a glTF 2.0 document, got a broken one ({fault})") from None
@@ -104,6 +131,29 @@ def _avatar(document: dict[str, Any], data: bytes) -> tuple[Avatar, list[str]]:
     is_vrm0 = "VRM" in document.get("extensions", {})
     avatar = Avatar(document, data, shapes, preset, bones, rest, is_vrm0)
     return avatar, list(dict.fromkeys(name for _, _, name, _ in named))
+
+
+def _check_meshes(document: Mapping[str, Any], size: int) -> None:
+    """Raise ValueError for meshes that are packed with Draco, or are not in the file."""
+    primitives = [primitive for mesh in document.get("meshes", ()) for primitive in mesh["primitives"]]
+    packed = {name for primitive in primitives for name in primitive.get("extensions", ())}
+    if DRACO in packed | set(document.get("extensionsRequired", ())):
+        raise ValueError(f"wanted meshes that are not packed with Draco, got packed ones: {UNPACK}")
+    views, accessors = document.get("bufferViews", ()), document.get("accessors", ())
+    for k, view in enumerate(views):
+        end = view.get("byteOffset", 0) + view["byteLength"]
+        if view["buffer"] == 0 and end > size:
+            raise ValueError(f"wanted {end} bytes for bufferViews[{k}], got {size}: export it again")
+    for k, accessor in enumerate(accessors):
+        sparse = accessor.get("sparse", {})
+        for part in (accessor, sparse.get("indices", {}), sparse.get("values", {})):
+            if not 0 <= (view := part.get("bufferView", 0)) < max(1, len(views)):
+                raise ValueError(f"wanted one of {len(views)} bufferViews in accessors[{k}], got {view}")
+    for primitive in primitives:
+        places = (primitive["attributes"], *primitive.get("targets", ()))
+        for accessor in (primitive.get("indices", 0), *(k for place in places for k in place.values())):
+            if not 0 <= accessor < len(accessors):
+                raise ValueError(f"wanted one of {len(accessors)} accessors in a mesh, got {accessor}")
 
 
 def _targets(document: Mapping[str, Any]) -> Iterator[tuple[int, int, str, bool]]:

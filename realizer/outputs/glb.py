@@ -1,5 +1,6 @@
 """The output .glb: an animated glTF 2.0 head with morph targets and joints, or somebody's own avatar."""
 
+import logging
 from collections.abc import Mapping
 from itertools import count
 from typing import Any
@@ -10,7 +11,7 @@ from realizer.animation.arkit import ARKIT_NAMES, arkit
 from realizer.core.array_types import Float32
 from realizer.face.glb_file import GlbFile, half_turns, quaternions
 from realizer.face.model import Face
-from realizer.outputs.avatar import Avatar, Bind, read_avatar, rotation_of
+from realizer.outputs.avatar import LISTED, Avatar, Bind, read_avatar, rotation_of
 from realizer.outputs.glb_mesh import GlbMesh
 from realizer.outputs.morph_targets import MorphTargets, make_arkit_targets, make_morph_targets
 from realizer.outputs.output import Output, RenderSettings
@@ -18,6 +19,8 @@ from realizer.outputs.vrma import expressions
 from realizer.realization import Realization
 
 # Node numbers; those of the eyes follow.
+log = logging.getLogger(__name__)
+
 FACE, NECK, HEAD = 0, 1, 2
 EYES = ("left_eye", "right_eye")
 
@@ -157,7 +160,11 @@ def _split(node: dict[str, Any]) -> None:
 
 def _encode(realization: Realization, drawing: RenderSettings) -> bytes:
     if drawing.avatar is not None:
-        return encode_avatar(realization, read_avatar(drawing.avatar))
+        avatar = read_avatar(drawing.avatar)
+        if missing := avatar.missing:
+            more = f" and {len(missing) - LISTED} more" if len(missing) > LISTED else ""
+            log.warning("%s: lacks ARKit's %s%s", drawing.avatar, ", ".join(missing[:LISTED]), more)
+        return encode_avatar(realization, avatar)
     if drawing.morphs == "arkit":
         return encode_glb(realization.face, make_arkit_targets(realization), realization.fps)
     targets = make_morph_targets(realization.face, realization.poses)

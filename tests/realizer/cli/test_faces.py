@@ -14,6 +14,7 @@ from realizer.cli.faces import mapping
 from realizer.core.errors import FaceError
 from realizer.face.load import list_faces
 from realizer.tables.mappings import read_mapping
+from tests import avatars
 from tests.commands import run
 
 IMPORTER = "realizer.facebuild.arkit.importer"
@@ -133,6 +134,27 @@ def test_check_of_a_head_prints_what_an_import_would_find(
     monkeypatch.setattr(f"{IMPORTER}.inspect_head", lambda path: SimpleNamespace(lines=("no jawOpen",)))
     done = run("faces", "check", str(head))
     assert (done.returncode, done.stdout) == (0, "no jawOpen\n")
+
+
+@pytest.mark.parametrize(("file", "options"), [("mine.vrm", ()), ("mine.glb", ("--avatar",))])
+def test_check_of_an_avatar_lists_its_shapes(tmp_path: Path, file: str, options: tuple[str, ...]) -> None:
+    path = tmp_path / file
+    path.write_bytes(avatars.avatar(("jawOpen", "mouthSmile_L")))
+    done = run("faces", "check", *options, str(path))
+    assert done.returncode == 0
+    found, missing = done.stdout.splitlines()
+    assert found == "found: 2 of ARKit's 52 shapes; bones of neck, leftEye, rightEye, head"
+    assert missing.startswith("missing: eyeBlinkLeft, eyeBlinkRight, ")
+    assert done.stderr == f"{path}: sound\n"
+
+
+def test_check_of_an_avatar_says_what_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "bare.vrm").write_bytes(avatars.avatar(()))
+    done = run("faces", "check", str(tmp_path / "bare.vrm"), str(tmp_path / "none.vrm"))
+    assert done.returncode == 1
+    assert "got no morph targets" in done.stdout
+    assert done.stdout.endswith("none.vrm: No such file or directory\n")
+    assert run("faces", "check", "--avatar").returncode == 2
 
 
 def test_check_exits_with_1_if_one_of_several_has_faults(head: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from realizer.face.glb_file import read_glb
-from realizer.outputs.avatar import read_avatar
+from realizer.outputs.avatar import DRACO, read_avatar
 from tests import avatars
 
 
@@ -109,6 +109,19 @@ def test_read_avatar_finds_arkit_shapes_among_expressions(written, vrm):
         (avatars.avatar([f"s{k}" for k in range(9)]), "s7, ..."),
         (changed(avatars.avatar(), lambda d: d["buffers"][0].update(uri="x.bin")), "data beside it"),
         (changed(avatars.avatar(), lambda d: d["nodes"][-1].update(mesh=99)), "IndexError"),
+        (
+            changed(avatars.avatar(), lambda d: d["accessors"][0].update(bufferView=99)),
+            "in accessors[0], got 99",
+        ),
+        (
+            changed(avatars.avatar(), lambda d: d["bufferViews"][1].update(byteLength=1 << 20)),
+            "bufferViews[1]",
+        ),
+        (
+            changed(avatars.avatar(), lambda d: d["meshes"][1]["primitives"][0].update(indices=99)),
+            "a mesh, got 99",
+        ),
+        (changed(avatars.avatar(), lambda d: d.update(extensionsRequired=[DRACO])), "not packed with Draco"),
         (changed(avatars.avatar(), lambda d: d.pop("nodes")), "KeyError: 'nodes'"),
         (changed(avatars.avatar(), lambda d: d["nodes"][3].update(children=[0])), "RecursionError"),
         (changed(avatars.avatar(), lambda d: d["meshes"][1].update(extras={"targetNames": 7})), "TypeError"),
@@ -118,6 +131,14 @@ def test_read_avatar_says_what_is_wrong(written, content, reason):
     with pytest.raises(ValueError, match=r"^avatar: .*mine\.glb: wanted") as error:
         read_avatar(written(content))
     assert reason in str(error.value)
+
+
+def test_avatar_missing_lists_what_nothing_shows(written):
+    missing = read_avatar(written(avatars.avatar(("jawOpen", "eyeBlinkLeft")))).missing
+    assert missing[:2] == ("eyeBlinkRight", "mouthFunnel")
+    assert len(missing) == 42  # bones turn the eyes
+    content = avatars.avatar(("a",), vrm=1, expressions={"aa": "a"})
+    assert read_avatar(written(content)).missing == ()
 
 
 def test_read_avatar_of_no_file_is_an_os_error(tmp_path):

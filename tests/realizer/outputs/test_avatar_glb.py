@@ -131,6 +131,14 @@ def test_avatar_made_of_our_own_face_is_valid(turn, tmp_path, read_by):
     assert json.dumps(seen["targets"]) == json.dumps(list(ARKIT_NAMES()))
 
 
+def test_avatar_that_lacks_shapes_is_warned_of_once(played, tmp_path, caplog):
+    (tmp_path / "mine.glb").write_bytes(avatars.avatar())
+    played.save(tmp_path / "x.glb", avatar=tmp_path / "mine.glb")
+    assert len(caplog.messages) == 1
+    assert "mine.glb: lacks ARKit's eyeBlinkLeft, eyeBlinkRight, mouthFunnel" in caplog.text
+    assert caplog.messages[0].endswith(" and 34 more")
+
+
 def test_avatar_is_for_glb_files_alone(played, tmp_path):
     with pytest.raises(ValueError, match=r"avatar: wanted a \.glb file"):
         played.save(tmp_path / "x.mp4", avatar="mine.glb")
