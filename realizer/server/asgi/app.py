@@ -61,6 +61,12 @@ def create_app(settings: Settings | None = None) -> Starlette:
         ("/{path:path}", "GET", _site),
     )
     routes = [Route(path, _guarded(hub, handler), methods=[method]) for path, method, handler in handlers]
+    # Before the site, which answers GET requests for any path.
+    routes[-1:-1] = [
+        Route(path, _guarded(hub, partial(_refuse_get, method)), methods=["GET"])
+        for path, method, _ in handlers
+        if method != "GET"
+    ]
     sockets = [WebSocketRoute(path, partial(_socket, hub, path)) for path in SOCKETS]
     return Starlette(routes=[*sockets, *routes], lifespan=hub.lifespan)
 
@@ -105,6 +111,11 @@ async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
         await client.close(1000, "")
     finally:
         await client.finish()
+
+
+async def _refuse_get(method: str, hub: Hub, request: Request) -> Response:
+    words = f"wanted {method} {request.url.path}, got {request.method}"
+    return JSONResponse({"error": words}, HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": method})
 
 
 async def _site(hub: Hub, request: Request) -> Response:

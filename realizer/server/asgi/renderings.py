@@ -28,6 +28,15 @@ OPTIONS = {
     "fps": NUMBER, "at": NUMBER, "seed": re.compile("-?[0-9]{1,18}"),
     "language": re.compile("[A-Za-z0-9-]{2,35}"), "morphs": NAME,
 }  # fmt: skip
+# What their values look like, in words.
+WORDS = {
+    **dict.fromkeys(OPTIONS, "a name of letters, digits, - and _"),
+    **dict.fromkeys(("fps", "at"), "a number"),
+    "background": "a colour such as #d8dde2, or transparent", "size": "WIDTHxHEIGHT, such as 640x480",
+    "seed": "an integer", "language": "a BCP-47 tag, such as nl-NL",
+}  # fmt: skip
+# Hints for users of the command.
+HINTS = r", or the path of a face folder or a GLB|; (REALIZER_|`realizer ).*"
 # Exit status of the command -> status of the answer.
 STATUS = {1: HTTPStatus.UNPROCESSABLE_ENTITY, 2: HTTPStatus.BAD_REQUEST, 3: HTTPStatus.SERVICE_UNAVAILABLE}
 
@@ -85,7 +94,7 @@ class Renderings:
                 words = f"wanted one of format, {', '.join(OPTIONS)}, got {name[:80]!r}"
                 raise JoinError(HTTPStatus.BAD_REQUEST, words)
             if not OPTIONS[name].fullmatch(value):
-                words = f"{name}: wanted a value of --{name}, got {value[:80]!r}"
+                words = f"{name}: wanted {WORDS[name]}, got {value[:80]!r}"
                 raise JoinError(HTTPStatus.BAD_REQUEST, words)
         drawn = OUTPUTS[suffix].picture_size is not None
         wanted: dict[str, str | None] = {**self._defaults, **asked}
@@ -119,8 +128,10 @@ async def _run(body: bytes, options: list[str], folder: Path) -> Path:
 
 
 def fault_of(said: str, folder: Path) -> str:
-    """Return what a command says of its failure, without its own options and the names of our files."""
-    lines = [line for line in said.splitlines() if line and not re.match("Usage: |Try |see .* --help$", line)]
-    own = r"^(realizer: |Error: |Invalid value for \S+: |--)+"
-    lines = [re.sub(own, "", line) for line in lines if str(folder) not in line]
+    """Return what a command says of its failure, without words about commands and the names of our files."""
+    lines = [re.sub("^(realizer: |Error: )+", "", line) for line in said.splitlines()]
+    lines = [line for line in lines if line and not re.match("Usage: |Try |see .* --help$", line)]
+    # An option's name stands before its fault, once.
+    lines = [re.sub(r"^(?:Invalid value for )?'?--([a-z]+)'?: (\1: )?", r"\1: ", line) for line in lines]
+    lines = [re.sub(HINTS, "", line) for line in lines if str(folder) not in line]
     return "\n".join(lines[-20:]) or "the renderer ended"

@@ -55,6 +55,13 @@ def test_app_serves_page_health_and_faces(app) -> None:
     assert app("GET", "/nothing")[0] == 404
 
 
+def test_app_refuses_to_get_what_is_posted(app) -> None:
+    status, headers, body = app("GET", "/realize")
+    assert (status, headers["allow"]) == (405, "POST")
+    assert json.loads(body) == {"error": "wanted POST /realize, got GET"}
+    assert app("GET", "/sessions/show")[1]["allow"] == "DELETE"
+
+
 def test_app_describes_itself(app) -> None:
     paths = json.loads(app("GET", "/openapi.json")[2])["paths"]
     assert set(paths) >= {"/realize", "/check", "/sessions/{session}/bml", "/sessions/{session}/feedback"}
