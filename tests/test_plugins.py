@@ -112,9 +112,15 @@ def test_plugins_of_the_documentation_have_types(tmp_path: Path) -> None:
 
 def test_plugins_include_the_package_of_the_documentation(site: Path, tmp_path: Path) -> None:
     (document,) = re.findall(r"^echo '(<bml .*)' \|$", ADDING, re.MULTILINE)
-    done = run(site, "realize", "-", "-o", str(tmp_path / "yuck.words"), document=document)
-    assert (tmp_path / "yuck.words").read_text().startswith("0.000 Yuck")
+    done = run(site, "realize", "-", "-o", str(tmp_path / "yuck.said"), document=document)
+    assert (tmp_path / "yuck.said").read_text().startswith("0.000 Yuck")
     assert "sneer" not in done.stderr
+
+
+def test_plugins_of_the_documentation_and_the_example_have_different_names() -> None:
+    example = tomllib.loads((ROOT / "examples" / "plugin" / "pyproject.toml").read_text("utf-8"))["project"]
+    for group, rows in PROJECT["entry-points"].items():
+        assert not rows.keys() & example["entry-points"][group].keys()
 
 
 def test_plugins_bring_a_behaviour_and_an_output(site: Path, tmp_path: Path) -> None:
