@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import time
 from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from errno import ECONNREFUSED
@@ -164,16 +165,16 @@ class Connection:
         """
         _LOG.warning("%s: connecting again", lost)
         self._interrupted = self.router.waiters.on_lost()
-        session = self.router.welcome["session"]
-        pause, waited = PAUSE, 0.0
+        await self._notify()
+        session, pause, until = self.router.welcome["session"], PAUSE, time.monotonic() + PATIENCE
         while True:
             await asyncio.sleep(pause)
-            waited, pause = waited + pause, min(2 * pause, LONGEST_PAUSE)
+            pause = min(2 * pause, LONGEST_PAUSE)
             try:
                 return await self._join(address_of(self.url, session=session, seen=str(self.router.seen)))
             except (OSError, LostError) as error:
-                if waited >= PATIENCE:
-                    words = f"{lost}, and there was no new one for {waited:.2g} s: {error}"
+                if time.monotonic() >= until:
+                    words = f"{lost}, and there was no new one for {PATIENCE:g} s: {error}"
                     raise ClientError(words) from None
 
     async def _join(self, url: str) -> None:
@@ -185,7 +186,7 @@ class Connection:
                 before = self.router.welcome
                 while self.router.welcome is before:  # missed feedback comes first
                     message = await socket.recv()
-                    reply = json.loads(message) if isinstance(message, str) and message[0] == "{" else {}
+                    reply = json.loads(message) if str(message).startswith("{") else {}
                     if reply.get("type") == "error" and str(reply.get("where")).startswith("hello"):
                         raise ClientError.of(reply)
                     if reply.get("type") == "gap":

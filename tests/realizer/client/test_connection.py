@@ -118,7 +118,9 @@ def test_connection_that_was_lost_subscribes_and_asks_again() -> None:
     serving(test)
 
 
-def test_connection_that_was_lost_raises_for_an_open_speech() -> None:
+def test_connection_that_was_lost_raises_for_an_open_speech_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("realizer.client.connection.PAUSE", LIMIT)
+
     async def test(url: str) -> None:
         async with connect(f"{url}?{SHOW}") as client:
             speech = client.speech("s")
@@ -237,7 +239,7 @@ def test_connection_raises_if_the_service_does_not_return(monkeypatch: pytest.Mo
             connect(f"{server.url}?{SHOW}") as client,
         ):
             await server.close()
-            with pytest.raises(ClientError, match=r"ends, and there was no new one for 0.03 s: .* Connect"):
+            with pytest.raises(ClientError, match=r"ends, and there was no new one for 0.02 s: .* Connect"):
                 await client.play(WAIT.format("b"))
 
     asyncio.run(run())

@@ -84,6 +84,19 @@ def test_sync_client_raises_a_refusal_and_ends_its_thread(url) -> None:
     assert "realizer client" not in [thread.name for thread in threading.enumerate()]
 
 
+def test_sync_client_restores_a_lost_connection(url) -> None:
+    async def lose() -> None:
+        client._original._connection._socket.transport.abort()
+
+    with connect(f"{url}?session=lost") as client:
+        client._thread.do(lose())
+        assert client.play(WAIT.format("b")).status == "DONE"
+    with connect(f"{url}?session=lost", reconnect=False) as client:
+        client._thread.do(lose())
+        with pytest.raises(ClientError, match="the connection has ended"):
+            list(client.until_end("b"))
+
+
 def test_sync_client_close_twice_does_nothing_more(url) -> None:
     with connect(url) as client:
         client.close()
