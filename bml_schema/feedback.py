@@ -84,13 +84,16 @@ class WarningFeedback:
     type: str  # such as PARSING_FAILURE
     text: str = ""  # explanation for people
     character_id: str | None = None
+    # Number of the connection whose block is refused because its id is in use; None for all other warnings.
+    in_use_for: int | None = None
     seq: int | None = field(default=None, compare=False)
 
     def to_xml(self, seq: int | None = None, epoch: float | None = None) -> str:
         """Return the element as XML text, without CDATA and child elements, which some clients refuse."""
         start = (
             f'<warningFeedback{_CORE} id="{sanitized_value(self.id)}" type="{sanitized_value(self.type)}"'
-            f"{_optional('characterId', self.character_id)}{_with_own(_seq(seq, self.seq))}"
+            f"{_optional('characterId', self.character_id)}"
+            f"{_with_own(_number('inUseFor', self.in_use_for) + _seq(seq, self.seq))}"
         )
         return f"{start}>{escape(sanitized(self.text))}</warningFeedback>" if self.text else f"{start}/>"
 
@@ -216,7 +219,13 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
         )
     if kind == core("warningFeedback"):
         text = "".join(str(t) for t in root.itertext())
-        return WarningFeedback(id=_required(root, "id"), type=_required(root, "type"), text=text, **common)
+        return WarningFeedback(
+            id=_required(root, "id"),
+            type=_required(root, "type"),
+            text=text,
+            in_use_for=_whole(root.get(own("inUseFor"), "")),
+            **common,
+        )
     if kind == core("predictionFeedback"):
         blocks = tuple(_block(e) for e in root if e.tag == core("bml"))
         behaviours = (read_behaviour(e, vocabulary) for e in root if e.tag != core("bml"))
@@ -296,8 +305,12 @@ def _posix(name: str, time: float | None, epoch: float | None, read: int | None)
 
 def _seq(seq: int | None, read: int | None) -> str:
     """Return the attribute of a number in the session; without one, of that which was read."""
-    number = read if seq is None else seq
-    return "" if number is None else f' realizer:seq="{number}"'
+    return _number("seq", read if seq is None else seq)
+
+
+def _number(name: str, value: int | None) -> str:
+    """Return an own attribute, or "" for None."""
+    return "" if value is None else f' realizer:{name}="{value}"'
 
 
 def _with_bmla(attributes: str) -> str:

@@ -44,6 +44,7 @@ class PlanningContext:
     # 0..1, how much expressions vary as people's do; 0: sides are equal, holds are still
     liveliness: float = 0.0
     animates: bool = True  # whether behaviours are expanded and played; False if only their times are wanted
+    sender: int | None = None  # number of the connection that the block came by
 
 
 # What a behaviour does to other blocks and behaviours when it starts.

@@ -92,9 +92,6 @@ class Client:
     async def play(self, bml: str) -> BlockProgress:
         """Send BML, wait for the end of its last block, and return that.
 
-        Feedback names blocks by their ids only. If several connections of a session send an id at the same
-        time, this may return the end of the block of another one, though its own was refused.
-
         Raises:
             ClientError: the block was refused, or the connection ended.
             TypeError: `bml` is no string.

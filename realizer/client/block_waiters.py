@@ -20,8 +20,6 @@ from realizer.client.errors import ClientError
 NO_ID = "<no id>"  # of warnings about documents whose block has no usable id
 # The id here of a block that gets one from the service, and the form of those ids.
 _MADE, _MADE_IDS = "unnamed0", re.compile(r"unnamed\d+")
-# Words of the warning about a block whose id is in use. All others are acknowledged before they are planned.
-_IN_USE = "is still in use"
 _NO_DOCUMENT = "wanted <bml>, got"  # words of the error about text between documents
 
 
@@ -73,7 +71,7 @@ class BlockWaiter:
         if self.block != warning.id:
             return False
         # A warning about a block that was planned is about something that was dropped from it.
-        return not (self.is_acknowledged if _IN_USE in warning.text else self.is_planned)
+        return warning.in_use_for is not None or not self.is_planned
 
     def continues(self, other: "BlockWaiter") -> bool:
         """Return whether the messages of this speech continue another one, so that they end together."""
@@ -131,10 +129,14 @@ class BlockWaiters:
     """The waiters of a connection, in the order in which their blocks were sent.
 
     If several have one id, the service answers them in this order too.
+
+    Attributes:
+        connection: the number of the connection in `welcome`.
     """
 
     def __init__(self, *waiters: BlockWaiter) -> None:
         self._waiters = list(waiters)
+        self.connection: int | None = None
 
     def add(self, *waiters: BlockWaiter) -> None:
         """Pass feedback to waiters from now on."""
@@ -210,9 +212,14 @@ class BlockWaiters:
             waiter.block, waiter.is_acknowledged = id, True
 
     def _refuse(self, warning: WarningFeedback) -> None:
+        if warning.in_use_for not in (None, self.connection):
+            return  # the block of another client
         found = [w for w in self._unfinished() if w.is_sent and w.is_refused_by(warning)]
         if not found:
             return
+        if warning.in_use_for is not None:
+            # If all are acknowledged, the last one was by the block of another client.
+            found = [w for w in found if not w.is_acknowledged] or found[-1:]
         for waiter in self._waiters:
             if waiter is found[0]:
                 break

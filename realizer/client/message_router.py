@@ -156,6 +156,7 @@ class Router:
         request = self._request
         if reply["type"] == "welcome":
             self.welcome, self.seen = reply, reply["seq"]
+            self.waiters.connection = reply.get("connection")
         if reply["type"] in ("subscribed", "changed"):
             key = reply["stream"], reply.get("index", 0)
             known = self._streams.get(key, {}) if reply["type"] == "changed" else {}

@@ -99,7 +99,8 @@ class BlockManager:
         if announced is None or self._announced.is_in_use(block, character):
             self._announced.pop(block.id)
             text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
-            return self._refuse(block, Warning(block.id, "PARSING_FAILURE", text), now)
+            in_use = Warning(block.id, "PARSING_FAILURE", text, in_use_for=context.sender)
+            return self._refuse(block, in_use, now)
         try:
             waits, waiting = self._announced.links(announced)
         except BlockRejectedError as refused:

@@ -138,7 +138,15 @@ class Reports:
         self._feedback.append(feedback)
 
     def warn(self, warning: Warning, character: str | None) -> None:
-        self.add(WarningFeedback(id=warning.id, type=warning.type, text=warning.text, character_id=character))
+        self.add(
+            WarningFeedback(
+                id=warning.id,
+                type=warning.type,
+                text=warning.text,
+                character_id=character,
+                in_use_for=warning.in_use_for,
+            )
+        )
 
     def take_all(self) -> list[Feedback]:
         pending, self._feedback = self._feedback, []

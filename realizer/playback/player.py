@@ -108,13 +108,20 @@ class Player(BlockManager):
                 needed |= kind.claims(node, self.context)
         return frozenset(needed)
 
-    def submit(self, block: Block, now: float, utterances: Mapping[str, Utterance] | None = None) -> Schedule:
+    def submit(
+        self,
+        block: Block,
+        now: float,
+        utterances: Mapping[str, Utterance] | None = None,
+        sender: int | None = None,
+    ) -> Schedule:
         """Plan a block and play it as its composition says.
 
         Args:
             block: as parsed; its problems are reported with it.
             now: seconds on the session clock.
             utterances: the results of `speech_requests(block)`.
+            sender: number of the connection that it came by.
 
         Returns:
             The schedule; `schedule.failed` if the whole block was refused. If it has `lengths`, more of the
@@ -125,7 +132,7 @@ class Player(BlockManager):
         takes = (
             self.context.face_inputs if self._face_inputs is None else partial(self._face_inputs, character)
         )
-        world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes)
+        world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes, sender=sender)
         return self.accept(block, world, now)
 
     def clear(self) -> None:

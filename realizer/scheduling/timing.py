@@ -99,6 +99,7 @@ class Warning:  # the standard's word
     """One BML warning: `id` is a block, "block:behaviour" or "block:constraint", `type` the standard's.
 
     `clash`: the minimal conflict that is the reason, if any. `constraint`: it is about a constraint.
+    `in_use_for`: as in `WarningFeedback`.
     """
 
     id: str
@@ -106,6 +107,7 @@ class Warning:  # the standard's word
     text: str
     clash: tuple[Clause, ...] = ()
     constraint: bool = False
+    in_use_for: int | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return {"id", "type", "text"}, and "clash": [{"id", "line", "text"}] if there is one."""

@@ -72,7 +72,14 @@ feedback = st.one_of(
         status=st.none() | st.just("DONE"),
     ),
     st.builds(SyncPointProgress, id=names, time=times, global_time=times, character_id=who),
-    st.builds(WarningFeedback, id=xml_text(1), type=names, text=xml_text(), character_id=who),
+    st.builds(
+        WarningFeedback,
+        id=xml_text(1),
+        type=names,
+        text=xml_text(),
+        character_id=who,
+        in_use_for=st.none() | st.integers(0, 10**9),
+    ),
     predictions(),
 )
 
@@ -98,7 +105,8 @@ def test_to_xml_uses_known_namespaces_and_plain_names(message: Feedback) -> None
     root = etree.fromstring(message.to_xml(7, 1.7e9).encode())
     assert str(root.tag).startswith(f"{{{CORE}}}")
     for name in root.attrib:
-        known = (f"{{{OWN}}}seq", f"{{{BMLA}}}status", f"{{{BMLA}}}posixTime")
+        known = (f"{{{OWN}}}{n}" for n in ("seq", "inUseFor"))
+        known = (*known, f"{{{BMLA}}}status", f"{{{BMLA}}}posixTime")
         assert not name.startswith("{") or name in known
 
 

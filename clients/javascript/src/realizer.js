@@ -1,4 +1,4 @@
-import { ANSWERS, JSON_STREAMS, RealizerError, frameOf, jsonFrameOf } from "./frames.js";
+import { ANSWERS, JSON_STREAMS, RealizerError, VERSION, frameOf, jsonFrameOf } from "./frames.js";
 import { WebSocket, parseXml } from "#platform";
 import { Playout } from "./playout.js";
 import { Voice, rateOf, samplesOf, timed } from "./voice.js";
@@ -6,6 +6,7 @@ import { Waiters, blocksOf } from "./waiters.js";
 
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
+const OWN = "urn:bml-realizer:1";
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const nothing = () => {};
 const over = () => new RealizerError("the connection was closed");
@@ -45,6 +46,8 @@ export class Realizer {
   #streams = new Map();
   #unsent = []; // documents to send once the connection is open
   #waiters = new Waiters();
+  #connection = null; // its number in `welcome`
+  #welcomed = nothing; // called with the first message of the connection
 
   /**
    * @param {object} [options]
@@ -84,17 +87,21 @@ export class Realizer {
     const socket = (this.socket = new WebSocket(url));
     let wasOpen = false;
     socket.binaryType = "arraybuffer";
+    this.#welcomed = () => {
+      this.#welcomed = nothing;
+      this.#tries = 0;
+      resolve();
+      this.onopen();
+    };
     socket.onopen = () => {
       wasOpen = true;
-      this.#tries = 0;
+      this.#post({ type: "hello", version: VERSION });
       for (const { message, playout } of this.#streams.values()) {
         playout?.reset();
         this.#post(message);
       }
       for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
       for (const text of this.#unsent.splice(0)) this.send(text);
-      resolve();
-      this.onopen();
     };
     socket.onmessage = (event) => this.#receive(event.data);
     socket.onerror = nothing; // `onclose` follows
@@ -200,8 +207,7 @@ export class Realizer {
   }
 
   /**
-   * Send BML as soon as the connection is open, and wait for the end of its last block. Feedback names blocks by their ids
-   * only: if another connection of the session sends the same id at the same time, this may be the end of its block.
+   * Send BML as soon as the connection is open, and wait for the end of its last block.
    * @returns {Promise<Element>} the feedback of the end; rejects if the block is refused
    */
   play(text) {
@@ -286,7 +292,10 @@ export class Realizer {
     if (!data.startsWith("{")) return this.#feedback(data);
     const message = JSON.parse(data);
     if (JSON_STREAMS.includes(message.type)) return this.#frame(jsonFrameOf(message));
-    if (message.type === "gap") this.#gap(message);
+    if (message.type === "welcome") {
+      this.#connection = message.connection;
+      this.#welcomed();
+    } else if (message.type === "gap") this.#gap(message);
     if (message.type === "subscribed" || message.type === "changed") {
       const stream = this.#streams.get(keyOf(message));
       if (stream) stream.streamInfo = { ...stream.streamInfo, ...message };
@@ -348,7 +357,10 @@ export class Realizer {
         this.#waiters[isNew ? "acknowledge" : "plan"](block.getAttribute("id"));
       }
     } else if (element.localName === "blockProgress" && id.endsWith(":end")) this.#waiters.end(id.slice(0, -4), element);
-    else if (element.localName === "warningFeedback") this.#waiters.refuse(id, element.textContent);
+    else if (element.localName === "warningFeedback") {
+      const sender = element.getAttributeNS(OWN, "inUseFor"); // of the block; other clients get the warning too
+      if (!sender || Number(sender) === this.#connection) this.#waiters.refuse(id, element.textContent, Boolean(sender));
+    }
     this.onfeedback(element, seq);
   }
 }

@@ -3,7 +3,6 @@ import { RealizerError } from "./frames.js";
 
 const NO_ID = "<no id>"; // of warnings about documents whose block has no usable id
 const MADE = /^unnamed\d+$/; // ids that the service gives to blocks without one
-const IN_USE = "is still in use"; // of the warning about a block that is not acknowledged, because its id is in use
 const CORE = "http://www.bml-initiative.org/bml/bml-1.0";
 const MAX_DOCUMENTS = 1000; // that the service reads in one text
 const MARKS = /<!--|<!\[CDATA\[|<\?|<(?:([\w.-]+):)?bml(?=[\s/>])|<\/(?:[\w.-]+:)?bml\s*>/g;
@@ -114,13 +113,17 @@ export class Waiters {
     this.#remove(ended);
   }
 
-  /** Reject the block that a warning refuses: not one that was planned, from which something was dropped. */
-  refuse(id, text) {
-    const isInUse = text.includes(IN_USE);
-    const one = this.#waiting().find(({ ids, mayLackId, isSent, acknowledged, planned }) => {
+  /**
+   * Reject the block that a warning refuses: not one that was planned, from which something was dropped.
+   * @param {boolean} [isInUse] whether it refuses a block of this client because its id is in use
+   */
+  refuse(id, text, isInUse = false) {
+    const found = this.#waiting().filter(({ ids, mayLackId, isSent, acknowledged, planned }) => {
       if (id === NO_ID) return !acknowledged && mayLackId;
-      return ids.includes(id) && (isInUse ? isSent && !acknowledged : !planned);
+      return ids.includes(id) && (isInUse ? isSent : !planned);
     });
+    // If all of its id are acknowledged, the last one was by the block of another client.
+    const one = isInUse ? (found.find(({ acknowledged }) => !acknowledged) ?? found.at(-1)) : found[0];
     if (!one) return;
     // If a message is refused as a whole, the warning is about its last block only.
     const before = this.#waiting().slice(0, this.#waiting().indexOf(one));

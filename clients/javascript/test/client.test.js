@@ -58,6 +58,14 @@ test("play of an id in use leaves the older block alone", async () => {
   assert.match(second.reason.message, /still in use/);
 });
 
+test("play of an id in use by another client rejects", async () => {
+  const clients = [0, 1].map(() => new Realizer({ url, session: "tabs" }));
+  await Promise.all(clients.map((client) => client.connect()));
+  const ends = await Promise.allSettled(clients.map((client) => client.play(NOD("twice"))));
+  assert.deepEqual(ends.map(({ status }) => status).sort(), ["fulfilled", "rejected"]);
+  for (const client of clients) client.close();
+});
+
 test("voice with the id of one that is being spoken leaves that alone", async () => {
   const [first, second] = [0, 1].map(() => {
     const voice = realizer.voice({ rate: RATE, id: "turn" });

@@ -3,7 +3,6 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Waiters, blocksOf } from "../src/waiters.js";
 
-const IN_USE = "block id 'b' is still in use: wanted an id of no block that plays or waits";
 const MADE = [{ ids: [], mayLackId: true }];
 const plain = (...ids) => ids.map((id) => ({ ids: [id, id], mayLackId: false }));
 
@@ -45,13 +44,23 @@ test("a warning that an id is in use ends the newer block only", async () => {
     const found = outcomes(waiters, ...plain("b", "b"));
     waiters.acknowledge("b");
     if (isPlanned) waiters.plan("b");
-    waiters.refuse("b", IN_USE);
+    waiters.refuse("b", "", true);
     await settled();
     assert.deepEqual(found, [null, "refused"]);
     waiters.end("b", "end");
     await settled();
     assert.deepEqual(found, ["end", "refused"]);
   }
+});
+
+test("a warning that an id is in use ends the block whose id another client uses", async () => {
+  const waiters = new Waiters();
+  const found = outcomes(waiters, ...plain("b"));
+  waiters.acknowledge("b"); // the other one's
+  waiters.plan("b");
+  waiters.refuse("b", "", true);
+  await settled();
+  assert.deepEqual(found, ["refused"]);
 });
 
 test("a block that another one replaces has its own end", async () => {

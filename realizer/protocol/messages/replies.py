@@ -57,6 +57,7 @@ class Welcome(Reply):
     type: Literal["welcome"] = "welcome"
     version: int = PROTOCOL
     session: str
+    connection: int = Field(0, description="number of this connection, as in the feedback's `inUseFor`")
     time: Seconds = Field(description="seconds on the session clock")
     seq: int = Field(description="seq of the newest feedback, 0 before the first")
     capabilities: Capabilities

@@ -33,7 +33,7 @@ class DocumentQueue:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._unread: deque[Iterator[Block | BMLError]] = deque()
+        self._unread: deque[tuple[Iterator[Block | BMLError], int | None]] = deque()  # with their senders
         self._block_ids = made_ids()  # for documents of dialects that have none
         self.received = 0  # number of the last message that came
         self._all_cancelled = 0  # all blocks up to this message are cancelled
@@ -43,8 +43,8 @@ class DocumentQueue:
         """Return the number of messages that are not read to their end."""
         return len(self._unread)
 
-    def put(self, text: str) -> Warning | None:
-        """Add a message, or return why it is refused."""
+    def put(self, text: str, sender: int | None = None) -> Warning | None:
+        """Add a message of a connection, or return why it is refused."""
         limits = self._settings
         if len(self._unread) >= limits.max_blocks:
             error = f"{limits.max_blocks} messages wait to be read: wanted fewer at a time"
@@ -53,7 +53,7 @@ class DocumentQueue:
             return Warning(block_id_of(text), "PARSING_FAILURE", too_large)
         most = {"max_bytes": limits.max_document, "max_behaviours": limits.max_behaviours}
         ids, strict_bml = self._block_ids, limits.strict_bml
-        self._unread.append(read(text, VOCABULARY, block_ids=ids, strict_bml=strict_bml, **most))
+        self._unread.append((read(text, VOCABULARY, block_ids=ids, strict_bml=strict_bml, **most), sender))
         self.received += 1
         return None
 
@@ -74,7 +74,7 @@ class DocumentQueue:
         """Return the next block or the warning that replaces it; None if the queue is empty."""
         while self._unread:
             try:
-                item = next(self._unread[0], None)
+                item = next(self._unread[0][0], None)
             except Exception:
                 log.exception("a document could not be read")
                 self._unread.popleft()
@@ -89,6 +89,11 @@ class DocumentQueue:
             self._unread.popleft()
         self._cancelled.clear()
         return None
+
+    @property
+    def sender(self) -> int | None:
+        """The number of the connection that the block that `next` returned last came by."""
+        return self._unread[0][1]
 
     @property
     def message(self) -> int:
@@ -143,9 +148,9 @@ class Submission:
         """Whether no document is being read or prepared and no speech is open."""
         return not (self.queue or len(self.pending) or len(self.speeches) or len(self.tts))
 
-    def enqueue(self, text: str) -> None:
-        """Add a message with documents to the queue, or refuse it."""
-        if (refused := self.queue.put(text)) is not None:
+    def enqueue(self, text: str, sender: int | None = None) -> None:
+        """Add a message of a connection with documents to the queue, or refuse it."""
+        if (refused := self.queue.put(text, sender)) is not None:
             self.refuse(refused)
 
     def _parse_next(self, t: float) -> bool:
@@ -157,7 +162,9 @@ class Submission:
         if isinstance(item, Warning):
             self.refuse(item)
         elif item is not None:
-            self._prepare(item, t, self.queue.message, cancelled=self.queue.is_cancelled(item))
+            self._prepare(
+                item, t, self.queue.message, cancelled=self.queue.is_cancelled(item), sender=self.queue.sender
+            )
         return item is not None
 
     def stop(self, blocks: Collection[str] | None, t: float) -> set[str]:
@@ -176,7 +183,15 @@ class Submission:
         self.withdraw(pending, t)
         return {w.block.id for w in pending}
 
-    def _prepare(self, block: Block, t: float, message: int = 0, *, cancelled: bool = False) -> None:
+    def _prepare(
+        self,
+        block: Block,
+        t: float,
+        message: int = 0,
+        *,
+        cancelled: bool = False,
+        sender: int | None = None,
+    ) -> None:
         """Request the speech of a block and acknowledge it. It is planned when nothing is missing."""
         busy = len(self.pending) + len(self._player.blocks.active())
         fault = block_limit_error(block, self._settings, busy, self._player.characters)
@@ -190,6 +205,7 @@ class Submission:
             pending = PendingBlock(
                 block, character, t, message, self._player.resources, is_incomplete=self.speeches.awaits_sync
             )
+            pending.sender = sender
             pending.is_streaming = self.speeches.is_streaming(block)
             self.pending.add(pending)
             self._player.announce(block, t)
@@ -216,11 +232,11 @@ class Submission:
         self._message = pending.message
         try:
             pending.block = self.speeches.with_links(pending.block)
-            schedule = self._player.submit(pending.block, t, pending.utterances)
+            schedule = self._player.submit(pending.block, t, pending.utterances, pending.sender)
             if schedule.lengths and pending.final:
                 # The voice never meets a length exactly, and time has passed: stretch the small difference.
                 pending.utterances = stretch_to_fit(pending.utterances, schedule.lengths)
-                schedule = self._player.submit(pending.block, t, pending.utterances)
+                schedule = self._player.submit(pending.block, t, pending.utterances, pending.sender)
         except Exception:
             self.pending.remove([pending])
             self._internal(pending.block)

@@ -51,6 +51,7 @@ class PendingBlock:
     final: bool = False  # whether the requested speech is used as it comes, without another request
     is_incomplete: Callable[[Block], bool] = lambda block: False
     is_streaming: bool = False  # whether the block speaks part of a sentence, which another block continues
+    sender: int | None = None  # number of the connection that it came by
 
     @cached_property
     def resources(self) -> frozenset[str]:

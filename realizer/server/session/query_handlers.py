@@ -55,6 +55,7 @@ class QueryHandlers:
             changed["expressions"] = sorted(library_of(s.library_folder))
         welcome = replies.Welcome(
             session=self.id,
+            connection=connection,
             time=t,
             seq=self.connections.log.newest,
             capabilities=replies.Capabilities(

@@ -215,7 +215,7 @@ class Session:
         elif control is not None:
             self._controls.handle(connection, control, t)
         else:
-            self.submission.enqueue(message)
+            self.submission.enqueue(message, id)
         return refused is None
 
     def _handle_passing(self, connection: Connection, control: Control, t: float) -> None:

@@ -179,6 +179,19 @@ def test_client_play_of_an_id_in_use_leaves_the_older_block_alone() -> None:
     serving(test)
 
 
+def test_client_play_of_an_id_in_use_by_another_client_is_refused() -> None:
+    async def test(url: str) -> None:
+        async with connect(f"{url}?session=s") as one, connect(f"{url}?session=s") as other:
+            ends = await asyncio.gather(
+                *(client.play(WAIT.format("b")) for client in (one, other)), return_exceptions=True
+            )
+            played, refused = sorted(ends, key=lambda end: isinstance(end, ClientError))
+            assert played.status == "DONE"
+            assert isinstance(refused, ClientError)
+
+    serving(test)
+
+
 def test_client_until_end_needs_something_to_wait_for() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:

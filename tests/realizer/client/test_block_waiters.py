@@ -14,8 +14,6 @@ from bml_schema.feedback import (
 from realizer.client.block_waiters import NO_ID, BlockWaiter, BlockWaiters, waiters_of
 from realizer.client.errors import ClientError
 
-IN_USE = "block id 'b' is still in use: wanted an id of no block that plays or waits"
-
 
 def planned(status: str, id: str = "b") -> PredictionFeedback:
     """A prediction without an end, as it is while a block waits for the end of an open speech."""
@@ -26,13 +24,14 @@ def block(id: str, time: float) -> BlockProgress:
     return BlockProgress(id=id, global_time=time)
 
 
-def warning(id: str, text: str = "") -> WarningFeedback:
-    return WarningFeedback(id=id, type="PARSING_FAILURE", text=text)
+def warning(id: str, in_use_for: int | None = None) -> WarningFeedback:
+    return WarningFeedback(id=id, type="PARSING_FAILURE", in_use_for=in_use_for)
 
 
 def ends(waiters: list[BlockWaiter], *messages: Feedback) -> list[str | None]:
     """Return the ids of the feedback that ends each waiter."""
     together = BlockWaiters(*waiters)
+    together.connection = 1
     for message in messages:
         together.on_feedback(message)
     return [waiter.last.id if waiter.last else None for waiter in waiters]
@@ -110,8 +109,10 @@ def test_waiters_of_one_id_end_in_the_order_in_which_they_were_sent() -> None:
 
 @pytest.mark.parametrize("first", [[], [planned("LURKING")]])
 def test_waiter_of_an_id_in_use_ends_without_the_older_one(first) -> None:
-    messages = [planned("IN_PREP"), *first, warning("b", IN_USE)]
+    messages = [planned("IN_PREP"), *first, warning("b", in_use_for=1)]
     assert ends([BlockWaiter("b"), BlockWaiter("b")], *messages) == [None, "b"]
+    assert ends([BlockWaiter("b")], *messages) == ["b"]  # acknowledged was the block of another client
+    assert ends([BlockWaiter("b")], planned("IN_PREP"), *first, warning("b", in_use_for=2)) == [None]
 
 
 def test_waiters_of_a_message_that_is_refused_as_a_whole_all_end() -> None:

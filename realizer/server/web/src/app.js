@@ -59,7 +59,6 @@ link.onopen = () => {
   timeline.reset();
   for (const tracks of Object.values(timeline.kinds)) tracks.reset();
   status("live", "Connected");
-  link.ask({ type: "hello" });
   link.ask({ type: "state" });
   if (!pose.empty) link.ask(pose.message);
   subscribe();
