@@ -147,9 +147,9 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
       this.#reset();
       this.#clear("connection");
     };
-    realizer.onlost = () => {
+    realizer.onlost = (error) => {
       const { origin } = realizer.url;
-      fail(new Error(wasOpen ? `lost the connection to ${origin}, connecting again` : `no service at ${origin}, or it refuses this page; trying again`));
+      fail(error ?? new Error(wasOpen ? `lost the connection to ${origin}, connecting again` : `no service at ${origin}, or it refuses this page; trying again`));
     };
     const character = own("character");
     realizer.connect().catch((error) => realizer.socket ?? fail(error)); // `onlost` says why there is no connection

@@ -7,7 +7,7 @@ export const DELAY: number;
 
 /** Why the service refused a message, or why there is no connection. */
 export class RealizerError extends Error {
-  /** As in the message `error`; "refused" for a block, "connection" for the connection, "gap" for a
+  /** As in the message `error`, such as "token"; "refused" for a block, "connection" for the connection, "gap" for a
    * session that ended while there was none. */
   code: string;
   /** Message type and field, or block. */
@@ -106,7 +106,7 @@ export class Realizer {
   seen: number | null;
   socket: WebSocket | null;
   onopen: () => void;
-  onlost: () => void;
+  onlost: (error: RealizerError | null) => void;
   onfeedback: (element: Element, seq: number) => void;
   onreply: (message: { type: string; [field: string]: unknown }) => void;
   onframe: (frame: Frame) => void;

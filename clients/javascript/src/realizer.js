@@ -10,6 +10,7 @@ const OWN = "urn:bml-realizer:1";
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const nothing = () => {};
 const over = () => new RealizerError("the connection was closed");
+const FINAL = 1008; // close code of refusals that another try does not mend
 /** Return a rejected promise that need not be handled. */
 const rejected = (error) => {
   const promise = Promise.reject(error);
@@ -23,7 +24,8 @@ const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character
  *
  * Handlers, as of a WebSocket:
  *   onopen()                    connected or reconnected
- *   onlost()                    disconnected; a new connection is tried
+ *   onlost(error)               disconnected; a new connection is tried, unless there is an error: then the service refuses
+ *                               the token, the session or the version
  *   onfeedback(element, seq)    BML feedback, as an XML element
  *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
  *   onframe(frame)              every frame of every stream, see `frameOf`; its `streamInfo` has the fields of the last
@@ -48,6 +50,8 @@ export class Realizer {
   #waiters = new Waiters();
   #connection = null; // its number in `welcome`
   #welcomed = nothing; // called with the first message of the connection
+  #refusal = null; // why the service does not let it in
+  #over = over; // () => why nothing is sent any more
 
   /**
    * @param {object} [options]
@@ -71,10 +75,12 @@ export class Realizer {
   /**
    * Connect, and reconnect until `close`. Requests made before the connection is open are sent then.
    * @returns {Promise<void>} resolves when the connection is open; rejects if the first attempt fails, though more
-   *   follow
+   *   follow, unless the service refuses the token (the code of the error is "token"), the session or the version
    */
   connect() {
     this.#closed = false;
+    this.#refusal = null;
+    this.#over = over;
     const opened = new Promise((resolve, reject) => this.#open(resolve, reject));
     opened.catch(nothing);
     return opened;
@@ -105,22 +111,30 @@ export class Realizer {
     };
     socket.onmessage = (event) => this.#receive(event.data);
     socket.onerror = nothing; // `onclose` follows
-    socket.onclose = ({ reason }) => {
+    socket.onclose = ({ code, reason }) => {
       // What comes later waits for the next connection, and is not interrupted.
       if (wasOpen) this.#waiters.interrupt();
-      reject(new RealizerError(`no connection to ${this.url}${reason ? `: ${reason}` : ""}`));
+      const refusal = this.#refusal ?? socket.refusal ?? (code === FINAL ? new RealizerError(reason, "token") : null);
+      reject(refusal ?? new RealizerError(`no connection to ${this.url.origin}${reason ? `: ${reason}` : ""}`));
       if (this.#closed) return;
-      this.onlost();
+      if (refusal) this.#end(() => refusal);
+      this.onlost(refusal);
+      if (refusal) return;
       setTimeout(() => this.#closed || this.#open(), 1000 * RETRY[Math.min(this.#tries++, RETRY.length - 1)]);
     };
   }
 
   /** Close the connection; pending promises and those of later calls are rejected. */
   close() {
-    this.#closed = true;
     this.socket?.close();
-    for (const { reject } of this.#asked) reject(over());
-    this.#waiters.abandon(over);
+    this.#end(over);
+  }
+
+  #end(reason) {
+    this.#closed = true;
+    this.#over = reason;
+    for (const { reject } of this.#asked) reject(reason());
+    this.#waiters.abandon(reason);
     this.#asked = [];
     this.#unsent = [];
   }
@@ -138,7 +152,7 @@ export class Realizer {
   ask(message) {
     this.#post(message);
     if (!(message.type in ANSWERS)) return Promise.resolve(null);
-    const answer = this.#closed ? Promise.reject(over()) : new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
+    const answer = this.#closed ? Promise.reject(this.#over()) : new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
     answer.catch(nothing);
     return answer;
   }
@@ -216,7 +230,7 @@ export class Realizer {
     // The service answers every other text.
     const got = isControl ? "a control message, which `ask` sends" : "nothing";
     if (!blocks.length) return rejected(new RealizerError(`wanted <bml>, got ${got}`, "refused"));
-    if (this.#closed) return rejected(over());
+    if (this.#closed) return rejected(this.#over());
     const ends = blocks.map((block) => this.#waiters.add({ ...block, isSent: true, message: blocks }));
     this.#later(text);
     return ends.at(-1);
@@ -280,7 +294,7 @@ export class Realizer {
   }
 
   #ended(id, speech = null) {
-    return this.#closed ? rejected(over()) : this.#waiters.add({ ids: [id], speech, isSent: Boolean(speech) });
+    return this.#closed ? rejected(this.#over()) : this.#waiters.add({ ids: [id], speech, isSent: Boolean(speech) });
   }
 
   #post(message) {
@@ -299,6 +313,10 @@ export class Realizer {
     if (message.type === "subscribed" || message.type === "changed") {
       const stream = this.#streams.get(keyOf(message));
       if (stream) stream.streamInfo = { ...stream.streamInfo, ...message };
+    }
+    if (message.type === "error" && this.#welcomed !== nothing && message.where?.startsWith("hello.")) {
+      this.#refusal = new RealizerError(message.message, message.code, message.where);
+      this.socket.close();
     }
     if (message.type === "error" && /^(speech\b|clip:)/.test(message.where)) this.#refuse(message);
     this.#answer(message);

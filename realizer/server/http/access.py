@@ -20,6 +20,8 @@ from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import memory_error
 from realizer.server.runtime.session_registry import JoinError
 
+log = logging.getLogger(__name__)
+
 LEEWAY = 10.0  # s; allows for different clocks of hosts
 MIN_RSA_BITS = 2048  # shorter keys are insecure
 # Elliptic curve -> the one algorithm that signs with it (RFC 7518, 3.4).
@@ -127,6 +129,7 @@ def _missing() -> RealizerError:
 
 # To listen on all addresses of the machine -> the one that it prints.
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+QUIET = 60.0  # s; not more often a refused token is a warning in the log
 PATIENCE = 10.0  # s; a client whose token comes in `hello` must have sent it by then
 # For a service without tokens, and for the service's own token.
 ANY_GRANT = Grant()
@@ -153,6 +156,7 @@ class AccessControl:
         self._verifier = (
             None if settings.jwt_key is None else TokenVerifier(settings.jwt_key, settings.jwt_audience)
         )
+        self._quiet_until = 0.0
         self._hosts = {*settings.hosts, settings.host.lower(), socket.gethostname().lower()}
         if self.requires_token:
             # On the level DEBUG it logs whole requests, with their tokens.
@@ -234,6 +238,16 @@ class AccessControl:
             raise JoinError(HTTPStatus.UNAUTHORIZED, words)
         token = hello.get("token")
         return self._admit(token if isinstance(token, str) else None)
+
+    def log_refusal(self, error: JoinError, address: str) -> None:
+        """Log a refusal, with the level WARNING that of a token, at most once in `QUIET` seconds."""
+        is_loud = error.status == HTTPStatus.UNAUTHORIZED and time.monotonic() >= self._quiet_until
+        if is_loud:
+            self._quiet_until = time.monotonic() + QUIET
+        level = logging.WARNING if is_loud else logging.INFO
+        log.log(
+            level, "refused: %s (from %s)", error, address, extra={"address": address, "status": error.status}
+        )
 
     def check_memory(self) -> None:
         """Raise JoinError (503) if memory is used up."""

@@ -2,7 +2,6 @@
 
 import asyncio
 import http
-import logging
 from collections.abc import Mapping
 from urllib.parse import parse_qsl
 
@@ -78,8 +77,6 @@ def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
     return Response(answer.status, http.HTTPStatus(answer.status).phrase, headers, answer.body)
 
 
-log = logging.getLogger(__name__)
-
 PARAMETERS = frozenset({"session", "seen", "token"})  # of a WebSocket's address; others are ignored
 SOCKETS = ("/ws", "/check", "/studio", "/label")  # paths of WebSockets
 
@@ -124,7 +121,7 @@ class HttpRequests:
     def refuse(self, error: JoinError, address: str) -> HttpResponse:
         """Log a request that was refused, and return its answer."""
         self._sessions.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": address, "status": error.status})
+        self._access.log_refusal(error, address)
         headers = (("WWW-Authenticate", "Bearer"),) if error.status == http.HTTPStatus.UNAUTHORIZED else ()
         return HttpResponse(error.status, TEXT, f"{error}\n".encode(), headers)
 

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.protocol.messages.replies import ErrorMessage
+from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, Grant
 from realizer.server.http.requests import path_of, session_of
@@ -18,6 +18,9 @@ from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
+
+# Status of a refusal that another try does not mend -> code of the error about it.
+REFUSALS: Mapping[int, ErrorCode] = {400: "invalid", 401: "token", 403: "token"}
 
 
 class ClientSocket(Outbound, Protocol):
@@ -62,10 +65,15 @@ class WebSocketConnections:
     def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
         """Check whether a WebSocket may be opened at one of `SOCKETS`.
 
+        A page cannot read why it was not opened, so its session and token are checked only after that.
+
         Raises:
             JoinError: the client may not open it.
         """
         works = path_of(target) in self._work
+        if not works and "origin" in headers and self._access.allows_origin(headers):
+            self._check_room(address)
+            return
         grant = self._access.request(target, headers, later=not works)
         self._check_room(address)
         if works:
@@ -158,13 +166,13 @@ class WebSocketConnections:
 
     async def _reject(self, client: ClientSocket, error: JoinError) -> None:
         self._sessions.metrics.counts["refused"] += 1
-        log.info("refused: %s", error, extra={"address": client.address, "status": error.status})
-        forbidden = error.status in (http.HTTPStatus.UNAUTHORIZED, http.HTTPStatus.FORBIDDEN)
-        if forbidden:
+        self._access.log_refusal(error, client.address)
+        code = REFUSALS.get(error.status)
+        if code is not None:
             where = "hello.token" if error.status == http.HTTPStatus.UNAUTHORIZED else "hello.session"
-            message = ErrorMessage(code="token", message=str(error), where=where)
+            message = ErrorMessage(code=code, message=str(error), where=where)
             await client.send_all(message.text())
-        await client.close(1008 if forbidden else 1013, str(error))
+        await client.close(1013 if code is None else 1008, str(error))
 
     async def _check(self, client: ClientSocket) -> None:
         """Serve the WebSocket of an editor: answer each text that arrives, BML by its faults."""

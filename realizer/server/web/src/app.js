@@ -63,9 +63,10 @@ link.onopen = () => {
   if (!pose.empty) link.ask(pose.message);
   subscribe();
 };
-link.onlost = () => {
+link.onlost = (error) => {
   mirror.stop();
-  status("lost", "Reconnecting");
+  status("lost", error?.message ?? "Reconnecting");
+  if (error) at("stage-note").textContent = error.message;
 };
 link.onfeedback = (element, seq) => {
   log.feedback(element, seq);

@@ -99,6 +99,42 @@ def test_admission_refuses_a_wrong_token_before_a_session_is_created() -> None:
     serving(test, token=TOKEN)
 
 
+@pytest.mark.parametrize(
+    ("query", "code", "says"),
+    [
+        ("?token=x", "token", "REALIZER_TOKEN"),
+        (f"?session=a%20b&token={TOKEN}", "invalid", "session: wanted"),
+    ],
+)
+def test_admission_tells_a_page_why_it_is_refused(query: str, code: str, says: str) -> None:
+    """Browsers do not show the answer to a refused handshake."""
+
+    async def test(server: Server) -> None:
+        async with connect(server.url + query, origin="http://localhost:3000") as socket:  # type: ignore[arg-type]
+            error = json.loads(await socket.recv())
+            assert (error["type"], error["code"]) == ("error", code)
+            assert says in error["message"]
+            with pytest.raises(ConnectionClosed) as closed:
+                await socket.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 1008
+
+    serving(test, token=TOKEN)
+
+
+def test_admission_warns_once_of_wrong_tokens(caplog: pytest.LogCaptureFixture) -> None:
+    async def test(server: Server) -> None:
+        for _ in range(3):
+            await welcomed(server.url, {"token": "x"})
+            with pytest.raises(InvalidStatus):
+                await connect(f"{server.url}?token=x")
+
+    serving(test, token=TOKEN)
+    (warning,) = [record.message for record in caplog.records if record.levelno == logging.WARNING]
+    assert "REALIZER_TOKEN" in warning
+    assert "127.0.0.1" in warning
+
+
 def test_admission_does_not_wait_for_a_silent_client(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(access, "PATIENCE", 0.05)
 
