@@ -203,6 +203,44 @@ def test_bml_face_says_that_there_is_no_service(show, site) -> None:  # type: ig
     page.wait_for_function("face.shadowRoot.querySelector('p').textContent.includes('ftp')")
 
 
+SAID = "face.shadowRoot?.querySelector('p').textContent"
+
+
+def test_bml_face_says_that_a_token_is_missing_or_wrong(show) -> None:  # type: ignore[no-untyped-def]
+    command = [
+        sys.executable,
+        "-m",
+        "realizer",
+        "serve",
+        "--port",
+        "0",
+        "--voice",
+        "silent",
+        "--token",
+        "Xk-secret-7",
+    ]
+    with serving(command) as service:
+        page = show("plate.glb", service)
+        page.wait_for_function(f"{SAID}?.includes('REALIZER_TOKEN), got none')")
+        page.evaluate("face.setAttribute('token', 'wrong')")
+        page.wait_for_function(f"{SAID}.includes('REALIZER_TOKEN), got another one')")
+        played = "face.realizer.play('<bml id=\"b\"/>').catch(({ code }) => code)"
+        assert page.evaluate(played) == "token"
+        page.evaluate("face.setAttribute('token', 'Xk-secret-7')")
+        loaded(page)
+        page.wait_for_function(f"{SAID} === ''")
+        page.evaluate("face.setAttribute('session', 'a b')")
+        page.wait_for_function(f"{SAID}.startsWith('session: wanted')")
+
+
+def test_bml_face_says_that_its_page_was_opened_as_a_file(browser, address) -> None:  # type: ignore[no-untyped-def]
+    page = browser.new_page()
+    page.goto(f"{PAGE.as_uri()}?service={address}&avatar=none.glb")
+    page.evaluate("globalThis.face = document.querySelector('bml-face')")
+    page.wait_for_function(f"{SAID}?.includes('opened as a file')")
+    page.close()
+
+
 def test_bml_face_follows_its_attributes_and_size(show) -> None:  # type: ignore[no-untyped-def]
     page = loaded(show("plate.glb"))
     page.evaluate("globalThis.before = face.realizer; face.setAttribute('session', 'other')")

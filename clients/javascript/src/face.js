@@ -149,7 +149,9 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
     };
     realizer.onlost = (error) => {
       const { origin } = realizer.url;
-      fail(error ?? new Error(wasOpen ? `lost the connection to ${origin}, connecting again` : `no service at ${origin}, or it refuses this page; trying again`));
+      const page = location.protocol === "file:" ? "this page, which was opened as a file: open it by HTTP" : "this page";
+      const reason = wasOpen ? `lost the connection to ${origin}, connecting again` : `no service at ${origin}, or it refuses ${page}; trying again`;
+      fail(error ?? new Error(reason));
     };
     const character = own("character");
     realizer.connect().catch((error) => realizer.socket ?? fail(error)); // `onlost` says why there is no connection

@@ -81,8 +81,8 @@ def _guarded(hub: Hub, handler: Callable[[Hub, Request], Any]) -> Callable[[Requ
         except JoinError as error:
             refused = hub.requests.refuse(error, address_of(request))
             answer = JSONResponse({"error": str(error)}, refused.status, dict(refused.headers))
-        origin = request.headers.get("origin")
-        if origin is not None and hub.access.allows_origin(dict(request.headers)):
+        origin = hub.access.origin_of_reader(f"/{request.path_params.get('path', '')}", dict(request.headers))
+        if origin is not None:
             answer.headers["Access-Control-Allow-Origin"] = origin
         answer.headers["Vary"] = "Origin"
         answer.headers["X-Content-Type-Options"] = "nosniff"

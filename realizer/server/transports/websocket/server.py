@@ -128,8 +128,7 @@ class WebSocketTransport:
             answer = await self._requests.answer(target, headers, upgrade=upgrade)
         except JoinError as error:
             answer = self._requests.refuse(error, address)
-        origin = headers.get("origin") if self._access.allows_origin(headers) else None
-        return response_to(answer, origin)
+        return response_to(answer, self._access.origin_of_reader(target, headers))
 
 
 def _unreachable_socket() -> socket.socket:

@@ -442,6 +442,8 @@ def test_admission_lets_pages_of_allowed_origins_read_answers() -> None:
         for origin in ("https://app.example", "http://localhost:3000"):
             for path in ("faces/ada", "healthz"):
                 assert (await headers(path, Origin=origin))["Access-Control-Allow-Origin"] == origin
+        module = await headers("bml-face.js", Origin="null")  # of a page that was opened as a file
+        assert module["Access-Control-Allow-Origin"] == "*"
         for response in (await headers("healthz"), await headers("healthz", Origin="https://evil.example")):
             assert response["Access-Control-Allow-Origin"] is None
             assert response["Vary"] == "Origin"
