@@ -29,9 +29,6 @@ class Receiver(Protocol):
 
     def receive(self, message: WireFrame[Any], now: float) -> None: ...
 
-    def restart(self) -> None:
-        """Handle a new connection, whose frames may have other numbers and times."""
-
 
 class Arrivals:
     """A receiver that keeps the newest frames as they arrive."""
@@ -41,9 +38,6 @@ class Arrivals:
 
     def receive(self, message: WireFrame[Any], now: float) -> None:
         self.frames.append(message)
-
-    def restart(self) -> None:
-        pass
 
 
 class Router:
@@ -132,7 +126,8 @@ class Router:
         self.waiters.fail(lost, {"code": "connection", "message": words})
         self._streams.clear()
         for receiver in self.receivers.values():
-            receiver.restart()
+            if isinstance(receiver, Playout):
+                receiver.restart()
 
     def queue_of(self, stream: str) -> deque[Frame]:
         """Return the newest messages of a stream; all of `schedule`, as each is the difference to others."""
@@ -221,6 +216,7 @@ class Playout:
         self._offsets.append((now, offset))
 
     def restart(self) -> None:
+        """Handle a new connection, whose frames may have other numbers and times."""
         self._frames.clear()
         self._offsets.clear()
         self._next = 0

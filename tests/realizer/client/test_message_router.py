@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from bml_schema.feedback import WarningFeedback
+from bml_schema.feedback import BlockProgress, WarningFeedback
 from realizer.client.errors import ClientError
 from realizer.client.message_router import (
     MAX_FRAMES,
@@ -194,3 +194,34 @@ def test_playout_without_ahead_passes_frames_on() -> None:
         frame = WireFrame(1, number, number / FPS, np.array([number], "<i4").tobytes())
         playout.receive(frame, ZERO + number / FPS + late)
         assert taken(playout, ZERO + number / FPS + late) == [(number, number)]
+
+
+def test_router_returns_feedback_up_to_a_gap_and_after_it(mail) -> None:
+    mail.receive('{"type":"welcome","version":1,"session":"s","time":0,"seq":4}')
+    assert mail.seen == 4
+    waiter = mail.on_sent("<bml id='b'/>")
+    assert waiter is not None
+    mail.receive(end_of("a", 5))
+    mail.on_gap([waiter])
+    mail.receive(end_of("c", 1))
+    assert mail.seen == 1
+    assert mail.take_feedback().id == "a:end"
+    with pytest.raises(ClientError, match="the session has begun anew") as caught:
+        mail.take_feedback()
+    assert caught.value.code == "gap"
+    assert mail.take_feedback().id == "c:end"
+    with pytest.raises(ClientError, match="the session has begun anew"):
+        waiter.end()
+
+
+def end_of(block: str, seq: int) -> str:
+    return BlockProgress(id=f"{block}:end", global_time=1.0).to_xml(seq=seq)
+
+
+def test_restart_takes_earlier_frames() -> None:
+    playout = Playout(AHEAD)
+    playout.receive(message(100, 1, 2), 10.0)
+    assert taken(playout, 20.0)
+    playout.restart()
+    playout.receive(message(0, 3), 30.0)
+    assert taken(playout, 40.0) == [(0, 3)]
