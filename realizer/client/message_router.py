@@ -115,7 +115,7 @@ class Router:
             interrupted: what was waited for then.
         """
         words = "the connection was lost, and the service no longer has the feedback that followed"
-        fault = {"code": "gap", "message": f"{words}: the session has begun anew, or was silent for too long"}
+        fault = {"code": "gap", "message": f"{words}: the session has begun anew, or too much was missed"}
         self.waiters.fail(interrupted, fault)
         self.feedback.append(ClientError.of(fault))
 
