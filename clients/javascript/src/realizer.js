@@ -7,6 +7,7 @@ import { Waiters, blocksOf } from "./waiters.js";
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
 const OWN = "urn:bml-realizer:1";
+const MARK = /^ask-\d+$/; // ids of pings behind messages without an answer
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const nothing = () => {};
 const over = () => new RealizerError("the connection was closed");
@@ -43,7 +44,8 @@ export class Realizer {
   socket = null;
   #tries = 0;
   #closed = false;
-  #asked = []; // { message, resolve, reject } of requests without an answer
+  #asked = []; // { message, mark, isSent, resolve, reject } of requests without an answer; mark: id of the ping behind it
+  #marks = 0;
   // stream, character and view -> { message, take, streamInfo: fields of `subscribed`, playout: with `ahead` }
   #streams = new Map();
   #unsent = []; // documents to send once the connection is open
@@ -106,7 +108,7 @@ export class Realizer {
         playout?.reset();
         this.#post(message);
       }
-      for (const { message } of this.#asked) if (message.type !== "subscribe") this.#post(message);
+      for (const asked of this.#asked) if (asked.message.type !== "subscribe") this.#request(asked);
       for (const text of this.#unsent.splice(0)) this.send(text);
     };
     socket.onmessage = (event) => this.#receive(event.data);
@@ -114,6 +116,9 @@ export class Realizer {
     socket.onclose = ({ code, reason }) => {
       // What comes later waits for the next connection, and is not interrupted.
       if (wasOpen) this.#waiters.interrupt();
+      const lost = this.#asked.filter(({ mark, isSent }) => mark && isSent);
+      this.#asked = this.#asked.filter((asked) => !lost.includes(asked));
+      for (const asked of lost) asked.reject(new RealizerError("the connection was lost"));
       const refusal = this.#refusal ?? socket.refusal ?? (code === FINAL ? new RealizerError(reason, "token") : null);
       reject(refusal ?? new RealizerError(`no connection to ${this.url.origin}${reason ? `: ${reason}` : ""}`));
       if (this.#closed) return;
@@ -146,15 +151,23 @@ export class Realizer {
 
   /**
    * Send a control message, such as { type: "state" }.
-   * @returns {Promise<object|null>} the answer; null immediately for messages without one. Rejects with a
-   *   RealizerError if the answer is an error; this need not be handled, as `onreply` gets it too.
+   * @returns {Promise<object|null>} the answer; null for messages without one, once the service has taken them. Rejects
+   *   with a RealizerError if the service refuses it; this need not be handled, as `onreply` gets the error too.
    */
   ask(message) {
-    this.#post(message);
-    if (!(message.type in ANSWERS)) return Promise.resolve(null);
-    const answer = this.#closed ? Promise.reject(this.#over()) : new Promise((resolve, reject) => this.#asked.push({ message, resolve, reject }));
+    if (this.#closed) return rejected(this.#over());
+    // The service answers in order: the pong comes after an error about the message.
+    const asked = { message, mark: message.type in ANSWERS ? null : `ask-${this.#marks++}` };
+    const answer = new Promise((resolve, reject) => this.#asked.push(Object.assign(asked, { resolve, reject })));
     answer.catch(nothing);
+    this.#request(asked);
     return answer;
+  }
+
+  #request(asked) {
+    asked.isSent = this.open;
+    this.#post(asked.message);
+    if (asked.mark) this.#post({ type: "ping", id: asked.mark });
   }
 
   /**
@@ -320,7 +333,7 @@ export class Realizer {
     }
     if (message.type === "error" && /^(speech\b|clip:)/.test(message.where)) this.#refuse(message);
     this.#answer(message);
-    this.onreply(message);
+    if (message.type !== "pong" || !MARK.test(message.id)) this.onreply(message);
   }
 
   /** Some feedback is not available. Without any that was seen, this is a new session of the same name. */
@@ -347,15 +360,18 @@ export class Realizer {
   }
 
   #answer(message) {
-    const error = message.type === "error";
-    const fits = error
-      ? ({ message: { type } }) => message.where?.split(".")[0] === type
-      : ({ message: { type, ...asked } }) =>
-          ANSWERS[type] === message.type && (type !== "subscribe" || keyOf(asked) === keyOf(message));
+    const { type, id, where = "" } = message;
+    const fits = ({ message: asked, mark }) => {
+      if (where === "type") return message.message.endsWith(`got ${JSON.stringify(asked.type)}`);
+      if (type === "error") return where.split(".")[0] === asked.type && (id ?? asked.id) === asked.id; // ids of speeches
+      if (mark || type === "pong") return type === "pong" && id === (mark ?? asked.id);
+      return ANSWERS[asked.type] === type && (type !== "subscribed" || keyOf(asked) === keyOf(message));
+    };
     const k = this.#asked.findIndex(fits);
     if (k < 0) return;
-    const [{ resolve, reject }] = this.#asked.splice(k, 1);
-    error ? reject(new RealizerError(message.message, message.code, message.where)) : resolve(message);
+    const [{ mark, resolve, reject }] = this.#asked.splice(k, 1);
+    if (type === "error") reject(new RealizerError(message.message, message.code, message.where));
+    else resolve(mark ? null : message);
   }
 
   /** Reject what waits for a speech whose message or clip (named SPEECH-NUMBER) the service has refused. */

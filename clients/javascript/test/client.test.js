@@ -77,6 +77,29 @@ test("voice with the id of one that is being spoken leaves that alone", async ()
   assert.equal((await first).getAttribute("id"), "turn:end");
 });
 
+test("ask rejects every message that is refused", async () => {
+  const refused = {
+    "set.emotion.name": { type: "set", emotion: { name: "nosuch" } },
+    "character.face": { type: "character", id: "Zoe", face: "nosuch" },
+    "stop.blocks": { type: "stop", blocks: ["zzz"] },
+    "speech.clip": { type: "speech", id: "s", clip: "nosuch" },
+    type: { type: "nosuch" },
+  };
+  const good = realizer.ask({ type: "set", aus: { 12: 0.1 } });
+  for (const [where, message] of Object.entries(refused)) await assert.rejects(realizer.ask(message), { name: "RealizerError", where });
+  assert.equal(await good, null);
+  assert.equal(await realizer.ask({ type: "set", aus: { 12: null } }), null);
+  assert.equal((await realizer.ask({ type: "ping", id: 7 })).id, 7);
+});
+
+test("ask before the connection is open is sent then", async () => {
+  const early = new Realizer({ url });
+  const refused = early.ask({ type: "set", emotion: { name: "nosuch" } });
+  early.connect();
+  await assert.rejects(refused, { where: "set.emotion.name" });
+  early.close();
+});
+
 test("connect rejects without a service", async () => {
   const lost = new Realizer({ url: "ws://127.0.0.1:1/ws" });
   await assert.rejects(lost.connect(), { code: "connection" });
