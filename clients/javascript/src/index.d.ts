@@ -88,14 +88,26 @@ export interface SayOptions extends SpeechOptions {
   visemeSet?: "oculus" | "mpeg4" | "sapi" | "polly";
 }
 
-/** A speech whose sound comes in parts. */
-export class Voice {
+/** A speech that is sent in parts. */
+declare abstract class OpenSpeech {
   readonly id: string;
-  write(pcm: Pcm): void;
-  words(words: readonly Timed[]): void;
+  /** When it started and its syncs were spoken, seconds on the session clock. */
+  readonly progress: { start: number | null; points: Record<string, number> };
   close(): void;
   stop(): void;
   ended(): Promise<Element>;
+}
+
+/** A speech whose text comes in parts. */
+export class Speech extends OpenSpeech {
+  append(text: string): Promise<void>;
+  until(sync: string): Promise<number>;
+}
+
+/** A speech whose sound comes in parts. */
+export class Voice extends OpenSpeech {
+  write(pcm: Pcm): void;
+  words(words: readonly Timed[]): void;
 }
 
 export class Realizer {
@@ -117,6 +129,8 @@ export class Realizer {
   play(bml: string): Promise<Element>;
   ended(block: string): Promise<Element>;
   say(sound: Pcm, options?: SayOptions): Promise<Element>;
+  speech(id?: string, options?: Omit<SpeechOptions, "id">): Speech;
+  stop(...blocks: string[]): Promise<null>;
   voice(options: SpeechOptions & { rate: number }): Voice;
   subscribe(stream: string, options?: SubscribeOptions, take?: (frame: Frame) => void): Promise<StreamInfo>;
   unsubscribe(stream: string, character?: string, view?: string): void;

@@ -9,6 +9,12 @@
  *   const { names } = await realizer.arkit({ fps: 30 }, (frame) => move(head, frame.values()));
  *   await realizer.play('<bml id="hello"><speech id="s"><text>Hello there.</text></speech></bml>');
  *
+ * A language model speaks:
+ *
+ *   const speech = realizer.speech("turn");
+ *   for await (const token of model) await speech.append(token);
+ *   speech.close();
+ *
  * Another voice speaks, and the lips follow its words, or its sound alone:
  *
  *   await realizer.say(wav, { words: [[0.1, "Hello"], [0.5, "there"]] });
@@ -31,5 +37,6 @@ export { RealizerError, VERSION, frameOf, packPicture } from "./frames.js";
 export { Clock, DELAY } from "./playout.js";
 export { BMLA, Realizer } from "./realizer.js";
 export { Sound } from "./sound.js";
+export { Speech } from "./speech.js";
 export { Voice } from "./voice.js";
 export { watch } from "./watch.js";

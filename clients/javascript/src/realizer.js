@@ -1,6 +1,7 @@
 import { ANSWERS, JSON_STREAMS, RealizerError, VERSION, frameOf, jsonFrameOf } from "./frames.js";
 import { WebSocket, parseXml } from "#platform";
 import { Playout } from "./playout.js";
+import { Speech } from "./speech.js";
 import { Voice, rateOf, samplesOf, timed } from "./voice.js";
 import { Waiters, blocksOf } from "./waiters.js";
 
@@ -10,6 +11,7 @@ const OWN = "urn:bml-realizer:1";
 const MARK = /^ask-\d+$/; // ids of pings behind messages without an answer
 const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
 const nothing = () => {};
+const timeOf = (element) => Number(element.getAttribute("globalTime"));
 const over = () => new RealizerError("the connection was closed");
 const FINAL = 1008; // close code of refusals that another try does not mend
 /** Return a rejected promise that need not be handled. */
@@ -18,6 +20,7 @@ const rejected = (error) => {
   promise.catch(nothing);
   return promise;
 };
+const madeId = () => `say-${crypto.getRandomValues(new Uint32Array(1))}`;
 const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character ?? "", view ?? ""]);
 
 /**
@@ -286,6 +289,22 @@ export class Realizer {
   }
 
   /**
+   * Open a speech whose text is sent as it comes.
+   * @param {string} [id] of the speech and of its block: a letter or _, then up to 63 letters, digits, - and _. Other blocks refer to a sync of its text as `ID:ID:sync`
+   * @param {object} [opening] language, character, composition: as in the message `speech`
+   * @returns {Speech}
+   */
+  speech(id = madeId(), opening = {}) {
+    const speech = new Speech(id, opening, (message) => this.#later(message), this.#ended(id, () => speech));
+    return speech;
+  }
+
+  /** End blocks gracefully: those of the ids, or all. Rejects, after stopping the others, if one is unknown. */
+  stop(...blocks) {
+    return this.ask({ type: "stop", ...(blocks.length ? { blocks } : {}) });
+  }
+
+  /**
    * Open a speech of any other voice whose sound comes in parts.
    * @param {object} options rate: samples a second. id of the speech and of its block, language, character,
    *   composition: as in the message `speech`
@@ -295,9 +314,9 @@ export class Realizer {
     return this.#voice(rate, opening);
   }
 
-  #voice(rate, { id = `say-${crypto.getRandomValues(new Uint32Array(1))}`, ...opening }) {
+  #voice(rate, { id = madeId(), ...opening }) {
     rateOf(rate); // before anything waits for the speech
-    const voice = new Voice(id, rate, opening, (message) => this.#later(message), this.#ended(id, () => voice));
+    const voice = new Voice(rate, id, opening, (message) => this.#later(message), this.#ended(id, () => voice));
     return voice;
   }
 
@@ -331,7 +350,7 @@ export class Realizer {
       this.#refusal = new RealizerError(message.message, message.code, message.where);
       this.socket.close();
     }
-    if (message.type === "error" && /^(speech\b|clip:)/.test(message.where)) this.#refuse(message);
+    if (message.type === "error" && /^(speech(?!\.append)\b|clip:)/.test(message.where)) this.#refuse(message);
     this.#answer(message);
     if (message.type !== "pong" || !MARK.test(message.id)) this.onreply(message);
   }
@@ -391,6 +410,11 @@ export class Realizer {
         this.#waiters[isNew ? "acknowledge" : "plan"](block.getAttribute("id"));
       }
     } else if (element.localName === "blockProgress" && id.endsWith(":end")) this.#waiters.end(id.slice(0, -4), element);
+    else if (element.localName === "blockProgress") this.#waiters.start(id.slice(0, -6), timeOf(element));
+    else if (element.localName === "syncPointProgress") {
+      const [, speech, behaviour, sync] = id.match(/^([^:]*)\.[^.:]*:([^:]*):(.*)$/) ?? []; // in blocks speech.1, speech.2, ...
+      if (behaviour === speech) this.#waiters.reach(speech, sync, timeOf(element));
+    }
     else if (element.localName === "warningFeedback") {
       const sender = element.getAttributeNS(OWN, "inUseFor"); // of the block; other clients get the warning too
       if (!sender || Number(sender) === this.#connection) this.#waiters.refuse(id, element.textContent, Boolean(sender));

@@ -1,18 +1,13 @@
 // Speech of any other voice: sound that is sent in clips, with or without the times of its words.
 import { RealizerError, packClip } from "./frames.js";
+import { OpenSpeech } from "./speech.js";
 
 const PIECE = 0.2; // s; a clip without words is sent in pieces of this length, the first of which starts the speech
 const LONGEST = 1 << 20; // bytes of a message
 const LOUDEST = 4; // floats beyond it are not within -1 to 1 and a little too loud, but int16 samples
-const nothing = () => {};
 
 /** A speech that is sent as sound comes; `Realizer.voice` opens one. */
-export class Voice {
-  /** Whether its last message was sent. */
-  closing = false;
-  #send; // sends text or bytes
-  #opening; // fields of the first message
-  #ended;
+export class Voice extends OpenSpeech {
   #rate;
   #samples = []; // Int16Arrays that are not sent
   #waiting = 0; // samples in them
@@ -22,19 +17,10 @@ export class Voice {
   #clips = 0;
   #closed = false;
 
-  /**
-   * @param {string} id of the speech and of its block
-   * @param {number} rate samples a second
-   * @param {object} opening composition, character, language of the message `speech`
-   * @param {Promise<Element>} ended
-   */
-  constructor(id, rate, opening, send, ended) {
-    this.id = id;
+  /** @param {number} rate samples a second */
+  constructor(rate, ...fields) {
+    super(...fields);
     this.#rate = rateOf(rate);
-    this.#opening = opening;
-    this.#send = send;
-    this.#ended = ended;
-    this.#ended.catch(nothing);
   }
 
   /**
@@ -64,21 +50,13 @@ export class Voice {
   close() {
     if (this.#closed) return;
     if (this.#waiting) this.#flush(this.#waiting);
-    this.#closed = this.closing = true;
-    this.#speech({ close: true });
-  }
-
-  /** Stop speaking at once. */
-  stop() {
-    if (!this.#clips) this.#speech({ append: "" }); // the service cannot stop what it does not know
-    this.#send(JSON.stringify({ type: "stop", blocks: [this.id] }));
-    if (!this.#closed) this.#speech({ close: true }); // until then the service ignores what has its id
     this.#closed = true;
+    this.finish();
   }
 
-  /** Wait for the end: resolves with its feedback, which has `said` if it was interrupted; rejects if it is refused. */
-  ended() {
-    return this.#ended;
+  stop() {
+    super.stop();
+    this.#closed = true;
   }
 
   /** Send so many samples as a clip, with the words that begin in it. */
@@ -107,16 +85,11 @@ export class Voice {
     const id = `${this.id}-${this.#clips++}`;
     const bytes = new Uint8Array(sound.buffer, sound.byteOffset, sound.byteLength);
     const isDescribed = description.text !== undefined || ["words", "phonemes", "visemes"].some((name) => description[name]?.length);
-    if (isDescribed) this.#speech({ clip: id, ...description });
+    if (isDescribed) this.post({ clip: id, ...description });
     for (let at = 0, number = 0; at < Math.max(1, bytes.length); at += LONGEST, number++) {
-      this.#send(packClip({ id, number, rate, sound: bytes.subarray(at, at + LONGEST), final: at + LONGEST >= bytes.length }));
-      if (!number && !isDescribed) this.#speech({ clip: id, ...description });
+      this.send(packClip({ id, number, rate, sound: bytes.subarray(at, at + LONGEST), final: at + LONGEST >= bytes.length }));
+      if (!number && !isDescribed) this.post({ clip: id, ...description });
     }
-  }
-
-  #speech(fields) {
-    this.#send(JSON.stringify({ type: "speech", id: this.id, ...this.#opening, ...fields }));
-    this.#opening = {};
   }
 }
 

@@ -82,7 +82,7 @@ export class Waiters {
   /**
    * Wait for a block.
    * @param {object} block ids and mayLackId as in `blocksOf`; message: what was sent with it; speech: returns its
-   *   Voice; isSent: whether this client sends it
+   *   OpenSpeech; isSent: whether this client sends it
    * @returns {Promise<Element>} the feedback of its end
    */
   add(block) {
@@ -102,13 +102,17 @@ export class Waiters {
     if (one) one.planned = one.acknowledged || !one.isSent;
   }
 
+  /** Take the start of a block, or a sync of its text, for the speeches that it speaks. */
+  start(id, time) {
+    for (const { speech } of this.#reached(id)) if (speech) speech().progress.start ??= time;
+  }
+
+  reach(id, sync, time) {
+    for (const { speech } of this.#reached(id)) speech?.().reach?.(sync, time);
+  }
+
   end(id, element) {
-    const one = this.#current(id);
-    if (!one) return;
-    // The messages of another speech that has its id continue one that is not closed.
-    const isShared = one.speech && !one.speech().closing;
-    const others = this.#waiting().filter(({ ids, speech, acknowledged }) => isShared && speech && ids[0] === id && !acknowledged);
-    const ended = [one, ...others];
+    const ended = this.#reached(id);
     for (const { resolve } of ended) resolve(element);
     this.#remove(ended);
   }
@@ -156,6 +160,15 @@ export class Waiters {
     const lost = this.#all.filter((one) => one.interrupted || !interrupted);
     for (const one of lost) one.reject(reason(one.ids[0]));
     this.#remove(lost);
+  }
+
+  #reached(id) {
+    const one = this.#current(id);
+    if (!one) return [];
+    // The messages of another speech that has its id continue one that is not closed.
+    const isShared = one.speech && !one.speech().closing;
+    const others = this.#waiting().filter(({ ids, speech, acknowledged }) => isShared && speech && ids[0] === id && !acknowledged);
+    return [one, ...others];
   }
 
   #waiting() {

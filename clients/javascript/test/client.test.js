@@ -1,7 +1,7 @@
 // The client against a real service, whose address is REALIZER_URL; tests/clients/test_javascript.py starts one.
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { Realizer, RealizerError, frameOf } from "bml-realizer-client";
+import { BMLA, Realizer, RealizerError, frameOf } from "bml-realizer-client";
 
 const url = process.env.REALIZER_URL ?? "ws://127.0.0.1:8765/ws";
 const NOD = (id) => `<bml id="${id}"><head id="n" lexeme="NOD"/></bml>`;
@@ -159,6 +159,67 @@ test("say rejects what is no sound and no word", async () => {
   assert.equal((await realizer.play(NOD("rate"))).getAttribute("id"), "rate:end");
   await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: ["Hello"] }), /words\[0\]: wanted/);
   await assert.rejects(realizer.say(tone(0.1), { rate: RATE, words: [[-0.1, "h"]] }), /wanted seconds from 0 on, got/);
+});
+
+const LONG = "One two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen. ";
+const statusOf = (end) => end.getAttributeNS(BMLA, "status");
+
+test("speech speaks text as it comes", async () => {
+  const speech = realizer.speech("story");
+  for (const token of ["Hel", "lo ", '<sync id="m"/>', "there. "]) await speech.append(token);
+  const spoken = await speech.until("m"); // before the rest is there
+  await speech.append("Good bye.");
+  speech.close();
+  assert.equal((await speech.ended()).getAttribute("id"), "story:end");
+  assert.ok(speech.progress.start <= spoken);
+  assert.equal(await speech.until("m"), spoken);
+  await assert.rejects(speech.until("nosuch"), /has ended without a sync nosuch/);
+});
+
+test("speech sends what follows soon in one message", async () => {
+  const sent = [];
+  const send = realizer.send;
+  realizer.send = (message) => sent.push(message) && send.call(realizer, message);
+  const speech = realizer.speech("tokens");
+  for (let k = 0; k < 50; k++) await speech.append("a ");
+  speech.close();
+  await speech.ended();
+  delete realizer.send;
+  assert.deepEqual(sent.map((message) => JSON.parse(message).append?.length), [2, 98, undefined]);
+});
+
+test("speech that is stopped makes its id free, and ignores what follows", async () => {
+  for (const stop of [(speech) => speech.stop(), ({ id }) => realizer.stop(id), () => realizer.stop()]) {
+    const speech = realizer.speech("turns");
+    await speech.append(`Now <sync id="m"/>${LONG}`);
+    await speech.until("m");
+    stop(speech);
+    const end = await speech.ended();
+    assert.equal(statusOf(end), "INTERRUPTED");
+    await speech.append(LONG);
+    speech.close();
+  }
+  const next = realizer.speech("turns");
+  await next.append("Yes.");
+  next.close();
+  assert.notEqual(statusOf(await next.ended()), "INTERRUPTED");
+  await assert.rejects(next.until("m"), /without a sync/);
+});
+
+test("speech that is closed or refused rejects what follows", async () => {
+  const closed = realizer.speech();
+  await closed.append("Yes.");
+  closed.close();
+  await assert.rejects(closed.append("No."), { code: "refused" });
+  await closed.ended();
+  const refused = realizer.speech("no speech");
+  await refused.append("Yes.");
+  await assert.rejects(refused.ended(), { where: "speech.id" });
+  await assert.rejects(refused.append("No."), { where: "speech.id" });
+});
+
+test("stop rejects an unknown block", async () => {
+  await assert.rejects(realizer.stop("zzz"), { where: "stop.blocks" });
 });
 
 test("voice speaks while its sound comes", async () => {

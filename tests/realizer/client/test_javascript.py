@@ -31,6 +31,10 @@ await realizer.faps({ fps: 25 }, (frame) => { const values: Int32Array = frame.v
 const words: Timed[] = [[0, "a"], [0.1, 0.2, "b"]];
 const end: Element = await realizer.say(new Int16Array(2), { rate: 16000, words });
 end.getAttribute("id");
+const speech = realizer.speech("turn", { composition: "REPLACE" });
+await speech.append("Hello <sync id='m'/>there.");
+(await speech.until("m")).toFixed();
+await realizer.stop(speech.id);
 // @ts-expect-error: a voice needs its rate
 realizer.voice({});
 """
