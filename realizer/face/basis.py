@@ -1,7 +1,6 @@
-"""The displacement matrices of a face, read from fields.npz, and the coupling of the lips' contours."""
+"""The displacement matrices of a face, read from fields.npz."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Int32
 from realizer.core.errors import FaceError
+from realizer.face.coupling import contours_of
 from realizer.face.model import Fapu
 from realizer.face.reading import read_arrays
 from realizer.tables import faps
@@ -16,7 +16,14 @@ from realizer.tables import faps
 FAPS = 68
 # Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle, the last by metres.
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
-ROWS = FAPS + 5
+# BEYOND + FAP is the number of the row that is added for what the FAP exceeds its limit here, in FAPU, the
+# most that action units ask for: more skin around goes along then.
+BEYOND = FAPS + 5
+LIMITS = {
+    **{6: 165, 7: 165, 53: 155, 54: 155, 15: 150}, **{37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305},
+    **{61: 80, 62: 80, 63: 110, 18: 195},
+}  # fmt: skip
+ROWS = BEYOND + FAPS
 
 FARTHEST = 1e4  # m
 AGAIN = "build or import the face again"
@@ -24,7 +31,7 @@ MOST_BULGE = 0.002  # m
 LOOKS = {23, 24, 25, 26}  # FAPs that turn eyeballs, or have fields where the eyes are no balls
 
 ARRAYS = {
-    "row": 1,  # which FAP (its number) or extra row (69..73 are JAW_COS.. + 1), ascending
+    "row": 1,  # which FAP (its number) or extra row (69..73 are JAW_COS.. + 1, then BEYOND + FAP), ascending
     "start": 1,  # where the row's part of vertex and move begins; one more than rows
     "vertex": 1,
     "move": 2,  # metres for each metre (radian) of FAP at the feature point
@@ -49,7 +56,7 @@ def basis_from(
 
     Returns:
         moving: (first, last + 1), the vertices that any FAP but the head's moves.
-        fields: (3 x moving, 73) sparse float32, metres per FAPU, then the jaw's and the tongue's five.
+        fields: (3 x moving, 141) sparse float32, metres per FAPU, with the jaw's and the tongue's five.
         head: (n, 1) float32 0..1; head_pivot: (3,).
         chin: (2,) float64, y and z of 2.1 about the jaw's axis.
         eyes: ((first, last + 1), (3,) centre) for left and right, (0, 0) of an eye that has fields instead
@@ -72,8 +79,8 @@ def basis_from(
     table = faps()
     for k, row in enumerate(stored["row"].tolist()):
         part = slice(int(stored["start"][k]), int(stored["start"][k + 1]))
-        # The rows after FAP 68 are in metres already.
-        scale = fapu.metres(table[row - 1].unit) if row <= FAPS else 1.0
+        # The rows of jaw and tongue are in metres already.
+        scale = 1.0 if FAPS < row <= BEYOND else fapu.metres(table[(row - 1) % BEYOND].unit)
         fields[row - 1, stored["vertex"][part] - first] = stored["move"][part].astype(np.float32) * scale
     balls = not LOOKS & set(stored["row"].tolist())
     chin = np.asarray(points["2.1"][1:], np.float64) - stored["jaw_pivot"][1:]
@@ -176,7 +183,7 @@ def pack(rows: Mapping[int, Any], threshold: float = 2e-3) -> dict[str, Any]:
     for number in sorted(rows):
         field = np.asarray(rows[number], np.float64)
         # Turns are in metres from the pivot.
-        least = threshold if number <= FAPS or number == JAW_DROP + 1 else threshold * 0.05
+        least = threshold * 0.05 if FAPS < number <= JAW_DROP else threshold
         index: Int32 = np.flatnonzero(np.abs(field).max(axis=1) > least).astype(np.int32)
         numbers.append(number)
         vertices.append(index)
@@ -198,59 +205,3 @@ def unpack(stored: Mapping[str, Any], n_vertices: int) -> dict[int, Any]:
         rows[number] = np.zeros((n_vertices, 3))
         rows[number][stored["vertex"][part]] = stored["move"][part]
     return rows
-
-
-# FAP of the inner contour -> FAP of the same movement of the outer contour.
-CONTOURS = {4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60}
-AXES = {"up": 1, "down": 1, "left": 0, "right": 0}
-# Largest change of the distance between the contours, as a part of this distance.
-ELASTICITY = 0.65
-# Least value of this change, as a part of the mouth's width.
-MIN_CHANGE = 0.05
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Contours:
-    """Pairs of FAPs of the inner and the outer contour, and their limits."""
-
-    inner: Int32  # (10,) columns of FAP rows
-    outer: Int32  # (10,) columns of FAP rows
-    max_difference: Float32  # (10,) FAPU, largest difference of the two values
-
-
-def contours_of(points: Mapping[str, Float32], fapu: Fapu) -> Contours:
-    """Return the contours of a face."""
-    table = faps()
-    limits = []
-    for inner, outer in CONTOURS.items():
-        row, other = table[inner - 1], table[outer - 1]
-        axis = AXES[row.direction]
-        distance = abs(float(points[row.feature_point][axis] - points[other.feature_point][axis]))
-        limits.append(max(ELASTICITY * distance, MIN_CHANGE * fapu.mw0) / fapu.metres(row.unit))
-    inner_columns, outer_columns = (np.array(list(c), np.int32) - 1 for c in (CONTOURS, CONTOURS.values()))
-    return Contours(inner_columns, outer_columns, np.array(limits, np.float32))
-
-
-def couple_lips(contours: Contours, rows: Float32) -> Float32:
-    """Return the rows in which each contour follows the other if it moves too far from it.
-
-    If the values of both contours differ by more than their limit, they approach each other, the smaller one
-    more than the larger one. If only one contour has a value, it keeps this value, and the other one follows.
-
-    Args:
-        rows: (n, 68) FAPU.
-
-    Returns:
-        (n, 68); `rows` itself if no contour has to follow.
-    """
-    inner, outer = rows[:, contours.inner], rows[:, contours.outer]
-    difference = inner - outer
-    excess = difference - np.clip(difference, -contours.max_difference, contours.max_difference)
-    if not excess.any():
-        return rows
-    strength = np.abs(inner), np.abs(outer)
-    share = strength[0] / np.maximum(strength[0] + strength[1], 1e-6)
-    out = rows.copy()
-    out[:, contours.outer] = outer + excess * share
-    out[:, contours.inner] = inner - excess * (1 - share)
-    return out

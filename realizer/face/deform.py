@@ -8,16 +8,18 @@ from realizer.core.array_types import Bool, Float32, Float64
 from realizer.core.units import ANGLE_UNIT
 from realizer.face.au.deformer import moves_of
 from realizer.face.basis import (
+    BEYOND,
     FAPS,
     JAW_COS,
     JAW_DROP,
     JAW_SIN,
+    LIMITS,
     ROWS,
     TONGUE_COS,
     TONGUE_SIN,
     bulge_at,
-    couple_lips,
 )
+from realizer.face.coupling import couple_lips, join_neighbours
 from realizer.face.model import Face
 from realizer.face.mouth_room import rooms
 
@@ -25,6 +27,7 @@ from realizer.face.mouth_room import rooms
 OPEN_JAW, TONGUE_ROLL, HEAD, EYES, THRUST = 2, 46, slice(47, 50), slice(22, 26), slice(26, 28)
 LIDS = slice(18, 22)  # upper left and right, lower left and right
 CHUNK = 16  # frames at once, so that they fit into the processor's cache
+LIMITED, MOST = np.array(list(LIMITS)) - 1, np.array(list(LIMITS.values()), np.float32)  # columns, FAPU
 MAX_JAW_TURN = 0.42  # rad, 24 degrees
 # Columns of rotations, which the sparse matrix does not apply. It has no rows for the rotations of eyeballs;
 # eyes without eyeballs have rows.
@@ -111,9 +114,11 @@ def jaw_pose(basis: Any, opening: Any) -> tuple[Float64, Float64]:
 
 
 def _weights(basis: Any, rows: Float32) -> Float32:
-    """Return the factors (n, 73) of the rows of the basis."""
+    """Return the factors (n, 141) of the rows of the basis."""
     weights = np.zeros((len(rows), ROWS), np.float32)
-    weights[:, 2:FAPS] = couple_lips(basis["contours"], rows)[:, 2:]
+    weights[:, 2:FAPS] = couple_lips(basis["contours"], join_neighbours(rows))[:, 2:]
+    limited = weights[:, LIMITED]
+    weights[:, BEYOND + LIMITED] = limited - np.clip(limited, -MOST, MOST)
     weights[:, ROTATING] = 0
     jaw, slid = jaw_pose(basis, rows[:, OPEN_JAW].astype(np.float64) * basis["open_jaw"])
     weights[:, JAW_COS], weights[:, JAW_SIN] = 1 - np.cos(jaw), np.sin(jaw)

@@ -7,16 +7,14 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Int32
 from realizer.face.basis import (
-    CONTOURS,
+    BEYOND,
     FAPS,
     JAW_COS,
     JAW_DROP,
     JAW_SIN,
     ROWS,
-    Contours,
-    contours_of,
-    couple_lips,
 )
+from realizer.face.coupling import CONTOURS, Contours, contours_of, couple_lips
 from realizer.face.deform import jaw_pose
 from realizer.face.mesh_geometry import triangle_normals
 from realizer.face.model import Fapu
@@ -167,7 +165,7 @@ def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, f
 
 
 def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
-    """Return the factors (73,) of the rows for FAP values (68,)."""
+    """Return the factors (141,) of the rows for FAP values (68,)."""
     out = np.zeros(ROWS)
     out[:FAPS] = values * [fapu.metres(row.unit) for row in faps()]
     turn, slid = jaw_pose({"chin": chin}, out[OPEN_JAW - 1])
@@ -181,6 +179,7 @@ def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]
     table, flip = faps(), np.array([-1.0, 1.0, 1.0])
     out = {}
     for number, field in fields.items():
-        mirror, sign = (table[number - 1].mirror, table[number - 1].sign) if number <= FAPS else (number, 1)
-        out[number] = (field + sign * fields[mirror][twin] * flip) / 2
+        place, fap = divmod(number - 1, BEYOND)
+        mirror, sign = (table[fap].mirror, table[fap].sign) if fap < FAPS else (number, 1)
+        out[number] = (field + sign * fields[place * BEYOND + mirror][twin] * flip) / 2
     return out

@@ -10,7 +10,7 @@ import numpy as np
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
-from realizer.face.basis import ARRAYS, unpack
+from realizer.face.basis import ARRAYS, BEYOND, unpack
 from realizer.face.cards import FILE as CARDS
 from realizer.face.features import read_features, write_features
 from realizer.face.load import MESH, read_head
@@ -123,7 +123,8 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
     rows = {fap: with_brows(at, parts, made[fap], np.zeros_like(at)) for fap in chosen}
     if only:
         stored = read_arrays(path, ARRAYS)
-        rows = unpack(stored, len(at)) | rows
+        own = unpack(stored, len(at))
+        rows = {number: row for number, row in own.items() if number - BEYOND not in chosen} | rows
         eyes = [
             (centre, radius)
             for (_, radius), centre in zip(rigid.balls(at, parts), stored["eye_centre"], strict=True)

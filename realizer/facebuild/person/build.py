@@ -14,6 +14,7 @@ import numpy as np
 
 from realizer.core.array_types import Float32, Float64
 from realizer.core.errors import FaceError
+from realizer.face.basis import BEYOND
 from realizer.face.cards import FILE as CARDS
 from realizer.face.features import Point, fapu_of, write_features
 from realizer.face.load import load_folder
@@ -39,6 +40,7 @@ SOURCE = (
 )
 RECIPE, WARP = "recipe.toml", "warp.npz"
 FOLD = 3  # ring around the eye that stays behind as the lid falls
+STEPS = 256  # a metre of a row beyond a limit; coarse numbers pack better
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
@@ -152,6 +154,10 @@ def write_face(
     vertices = np.concatenate([part.vertices for part in made])
     points = _points(person, vertices, base, ranges)
     _mend(rows, made[0], points, person)
+    skins = np.repeat([part.patch is not None for part in made], np.diff(count))[:, None]
+    for number in fields:
+        if number > BEYOND:
+            rows[number] = np.rint((rows[number] - rows[number - BEYOND]) * skins * STEPS) / STEPS
     lids = sliding(rows, vertices, ranges, list(person.balls))
     write_mesh(
         folder / "mesh.npz",

@@ -10,6 +10,7 @@ from realizer.face.basis import JAW_SIN
 from realizer.facebuild.fix_flipped import JAW, LIPS, symmetrize, without_flips
 from realizer.facebuild.mpeg4.rigid import opening_rows, tongue_bends
 from realizer.facebuild.parts import smooth
+from realizer.facebuild.person.far_fields import far_fields
 from realizer.facebuild.person.lids import Lid, lid_fields
 from realizer.facebuild.person.lips import Lips, lip_fields
 from realizer.facebuild.person.makehuman import FORWARD, LEFT, UP, Ground, scaled
@@ -31,7 +32,7 @@ WRINKLED = 0.65, (0.016, 0.024, 0.030), 0.85
 
 
 def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64], Lips]:
-    """Return row number (FAP number, or 70..73: `basis`) -> field (n, 3) on the base mesh; and the lips."""
+    """Return row number (FAP number, or others: `basis`) -> field (n, 3) on the base mesh; and the lips."""
     lips = Lips(ground)
     fields = lip_fields(ground, lips)
     fields |= _jaw(ground, lips, jaw_pivot)
@@ -49,7 +50,8 @@ def face_fields(ground: Ground, jaw_pivot: Float64) -> tuple[dict[int, Float64],
     # and to mend that makes lumps.
     others = {number: field for number, field in fields.items() if number not in LIPS and number not in JAW}
     mended = without_flips(others, ground.at, triangles, ground.points, ground.fapu(), jaw_pivot, twin)
-    return fields | mended, lips
+    fields |= mended
+    return fields | symmetrize(far_fields(ground, lips, fields), twin), lips
 
 
 def _jaw(ground: Ground, lips: Lips, pivot: Float64) -> dict[int, Float64]:

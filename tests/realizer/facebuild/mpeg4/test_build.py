@@ -9,6 +9,7 @@ from click.testing import CliRunner
 
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
+from realizer.face.basis import BEYOND
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
@@ -89,11 +90,11 @@ def test_apply_zones_twice_gives_the_same_bytes(plain: Path, tmp_path: Path) -> 
 def test_apply_zones_to_some_faps_keeps_the_others(tmp_path: Path) -> None:
     folder = copy(tmp_path, fields=True)
     own = load_face()
-    apply_zones(folder, setup_of(folder), only={31, 32})
+    apply_zones(folder, setup_of(folder), only={31, 32, 37, 38})
     mixed = face_of(folder)
     before, after = own.basis["fields"].toarray(), mixed.basis["fields"].toarray()
     changed = np.flatnonzero(np.abs(before - after).max(axis=0) > 1e-6) + 1
-    assert changed.tolist() == [31, 32]
+    assert changed.tolist() == [31, 32, 37, 38, BEYOND + 37, BEYOND + 38]
     assert check_face(folder.name, folder.parent) == ()
 
 

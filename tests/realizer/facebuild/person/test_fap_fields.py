@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.face.basis import FAPS, JAW_COS, JAW_DROP, JAW_SIN, TONGUE_COS, TONGUE_SIN
+from realizer.face.basis import BEYOND, FAPS, JAW_COS, JAW_DROP, JAW_SIN, LIMITS, TONGUE_COS, TONGUE_SIN
 from realizer.facebuild.mpeg4.fields import WAYS
 from realizer.facebuild.person.lids import Lid
 from realizer.facebuild.person.makehuman import Ground
@@ -18,7 +18,8 @@ Fields = dict[int, np.ndarray]
 def test_face_fields_serve_all_faps_but_turns(fields: Fields) -> None:
     driven = {row.fap for row in faps()[2:] if row.unit == "angle_unit" or row.direction == "growing"}
     extra = {row + 1 for row in (JAW_COS, JAW_SIN, JAW_DROP, TONGUE_COS, TONGUE_SIN)}
-    assert set(fields) == {*range(3, FAPS + 1)} - driven - {3} | extra | ({43, 44} & set(fields))
+    far = {BEYOND + fap for fap in LIMITS}
+    assert set(fields) == {*range(3, FAPS + 1)} - driven - {3} | extra | ({43, 44} & set(fields)) | far
 
 
 def test_face_fields_move_each_feature_point_by_one(ground: Ground, fields: Fields) -> None:

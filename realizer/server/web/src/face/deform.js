@@ -1,6 +1,16 @@
 // The vertices of a head under one FAP, by the formulas of realizer/face (deform.py, basis.py).
 
 const OUTER = { 4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60 };
+// FAP -> FAPU by which its value may be above and below those of its neighbours, and these; 37 and 38 go towards each other.
+const NEIGHBOURS = {
+  31: [250, 250, 33, 32], 33: [180, 250, 31, 35], 35: [160, 160, 33], 37: [260, 260, 38],
+  32: [250, 250, 34, 31], 34: [180, 250, 32, 36], 36: [160, 160, 34], 38: [260, 260, 37],
+  4: [250, 230, 8, 9], 8: [200, 285, 4], 9: [200, 285, 4], 5: [200, 265, 10, 11], 10: [275, 200, 5], 11: [275, 200, 5],
+  51: [260, 190, 55, 56], 55: [235, 320, 51], 56: [235, 320, 51], 52: [370, 265, 57, 58], 57: [345, 260, 52], 58: [345, 260, 52],
+};
+const OPPOSITE = new Set([37, 38]);
+// FAPU beyond which a head's own shape takes more skin along, which the service computes.
+const LIMITS = { 6: 165, 7: 165, 53: 155, 54: 155, 15: 150, 37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305, 61: 80, 62: 80, 63: 110, 18: 195 };
 const PARTNER = new Map(Object.entries(OUTER).flatMap(([inner, outer]) => [[Number(inner), outer], [outer, Number(inner)]]));
 const ELASTICITY = 0.65; // most change of the distance between the lips' contours, of that distance
 const MIN_CHANGE = 0.05; // of the mouth's width
@@ -13,8 +23,26 @@ export function fapuOf(points) {
   return Object.fromEntries(Object.entries(units).map(([unit, metres]) => [unit, metres / 1024]));
 }
 
-// The values that move when one FAP has a value: if a lip's contour goes too far, the other one follows.
+export const beyond = ([fap, value]) => Math.abs(value) > LIMITS[fap];
+
+// FAP -> how far each point is behind one that moves far, up or down.
+function behind(fap, value) {
+  const found = new Map([[fap, 0]]);
+  for (const [one, off] of found) {
+    const [above, below, ...others] = NEIGHBOURS[one] ?? [0, 0];
+    for (const other of others) if (!found.has(other)) found.set(other, off + (value > 0 ? above : below));
+  }
+  return found;
+}
+
+const shrunk = (value, by) => Math.sign(value) * Math.max(0, Math.abs(value) - by);
+
+// The values that move when one FAP has a value: points and contours of the lips follow those that go too far.
 export function coupled(fap, value, points, rows) {
+  return [...behind(fap, value)].flatMap(([one, off]) => contours(one, shrunk(value, off) * (one !== fap && OPPOSITE.has(one) ? -1 : 1), points, rows));
+}
+
+function contours(fap, value, points, rows) {
   const other = PARTNER.get(fap);
   if (!other) return [[fap, value]];
   const row = rows.get(Math.min(fap, other));
@@ -22,7 +50,7 @@ export function coupled(fap, value, points, rows) {
   const apart = Math.abs(points[row.point][axis] - points[rows.get(Math.max(fap, other)).point][axis]);
   const units = fapuOf(points);
   const most = Math.max(ELASTICITY * apart, MIN_CHANGE * units.MW * 1024) / units[row.unit];
-  return [[fap, value], [other, Math.sign(value) * Math.max(0, Math.abs(value) - most)]];
+  return [[fap, value], [other, shrunk(value, most)]];
 }
 
 // Vertices of lids that slide over an eyeball, which one, and their least distance from its middle.

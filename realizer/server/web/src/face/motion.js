@@ -1,5 +1,5 @@
 // How the edited head moves: fields that are computed in slices, shapes and rigid parts from the service.
-import { coupled, fapuOf, keepLids, lidsOf } from "./deform.js";
+import { beyond, coupled, fapuOf, keepLids, lidsOf } from "./deform.js";
 import { fieldOf } from "./zones.js";
 
 const LIDS = new Set([19, 20, 21, 22]);
@@ -70,7 +70,7 @@ export class Motion {
   // Go on with the fields for at most `budget` ms. Return the vertices, if they are all there and new.
   step(budget) {
     if (!this.pending || !this.draft.mesh) return null;
-    if (!this.has(this.fap)) return this.remote();
+    if (!this.has(this.fap) || this.moving.some((one) => beyond(one) && (this.own || !this.draft.state.by.has(one[0])))) return this.remote();
     const wanted = [...this.moving.map(([fap]) => fap), ...(this.blinks ? LIDS : [])];
     const end = performance.now() + budget;
     for (const fap of wanted) {
