@@ -68,6 +68,7 @@ def deform(face: Face, poses: Any) -> Float32:
         rows[:, LIDS] *= 1 - np.tile(units.closed(shown), 2)
     out = np.empty((len(rows), *face.vertices.shape), np.float32)
     weights = _weights(basis, rows)
+    moved |= weights[:, BEYOND:].any(axis=1)
     first, last = basis["moving"]
     for start in range(0, len(rows), CHUNK):
         part = slice(start, start + CHUNK)

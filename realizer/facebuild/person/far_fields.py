@@ -15,13 +15,15 @@ from realizer.facebuild.parts import smooth
 from realizer.facebuild.person.lips import Lips
 from realizer.facebuild.person.makehuman import FORWARD, LEFT, UP, Ground, scaled
 
+LIDS = ("3.1", "3.3"), ("3.2", "3.4")
 FOREHEAD, SOCKET, BRIDGE = 0.036, 0.020, 0.022  # m above brows, below them, and between them downwards
-CLIMB, ASIDE = 0.9, 0.010  # metres forwards that skin from beside the bridge climbs it; m
+CLIMB, ASIDE = 0.45, 0.010  # metres forwards that skin from beside the bridge climbs it; m
 GLABELLA = -0.6, -0.35, -0.05  # metres forwards per metre sideways at the other brow, the middle, the brow
 TEMPLE, BEHIND = 0.012, -0.03  # m beyond the outer end of a brow; back
 PUFFED = np.array([0.034, 0.0, 0.010]), (0.050, 0.046, 0.052)  # m inwards, down and back; half axes
-LIFTED, ABOVE, BULGE = (0.040, 0.036, 0.045), 0.012, 0.35  # m; m; metres forwards per metre upwards
-SQUINT = 0.9  # metres that the lower lid rises per metre of the cheek
+LIFTED, ABOVE, BULGE = (0.040, 0.036, 0.045), 0.004, 0.6  # m; m; metres forwards per metre upwards
+SQUINT = 0.55, 0.25  # metres that the lower lid rises and the upper one falls per metre of the cheek
+STRETCHED = 0.014  # m more skin beside and below the nose
 FLANK = 0.045  # m beyond a wing of the nose, or the corners of the lips
 RAISED = 0.006, (0.030, 0.026, 0.036), 0.4  # m below the boss of the chin; half axes; metres forwards
 ROOT = 0.010  # m above the eyes; skin that goes up with the nose ends there
@@ -36,9 +38,6 @@ def far_fields(ground: Ground, lips: Lips, near: Mapping[int, Float64]) -> dict[
     """
     far = _brows(ground) | _cheeks(ground, lips, near) | _nose(ground, lips) | _mouth(ground, lips, near)
     return {BEYOND + fap: field for fap, field in far.items()}
-
-
-LIDS = ("3.1", "3.3"), ("3.2", "3.4")
 
 
 def _calm(ground: Ground, radii: tuple[float, float, float]) -> Float64:
@@ -82,8 +81,9 @@ def _cheeks(ground: Ground, lips: Lips, near: Mapping[int, Float64]) -> dict[int
         out[number] = scaled(ground.smoothed(dome[:, None] * away, 4), points[name], side * LEFT)
     for number, name, lid in ((41, "5.3", 21), (42, "5.4", 22)):
         mound = ground.ellipsoid(ground.point(name) + ABOVE * UP, LIFTED, 0.15) * free
-        mound *= _calm(ground, (0.022, 0.014, 0.03))
-        field = ground.smoothed(mound[:, None] * (UP + BULGE * FORWARD), 3) + SQUINT * near[lid]
+        mound *= _calm(ground, (0.025, 0.018, 0.03))
+        field = ground.smoothed(mound[:, None] * (UP + BULGE * FORWARD), 3)
+        field += SQUINT[0] * near[lid] + SQUINT[1] * near[lid - 2]
         out[number] = scaled(field, points[name], UP)
     return out
 
@@ -91,7 +91,7 @@ def _cheeks(ground: Ground, lips: Lips, near: Mapping[int, Float64]) -> dict[int
 def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
     at, points, free = ground.at, ground.points, 1 - lips.lips
     out = {}
-    still = _calm(ground, (0.024, 0.012, 0.03)) * free * ground.body * (at[:, 2] > -0.02)
+    still = _calm(ground, (0.024, 0.019, 0.03)) * free * ground.body * (at[:, 2] > -0.02)
     tip, lip = ground.point("9.3"), ground.point("8.1")
     for number, name, side in ((61, "9.1", 1), (62, "9.2", -1)):
         wing = ground.point(name)
@@ -103,8 +103,10 @@ def _nose(ground: Ground, lips: Lips) -> dict[int, Float64]:
         field = (share * up * still)[:, None] * way
         out[number] = scaled(ground.smoothed(field, 2), points[name], side * LEFT)
     base = ground.point("9.15")[1]
-    up = np.interp(at[:, 1], [lip[1], base, tip[1], ROOT], [0, 1, 1, 0])
-    share = smooth(np.abs(at[:, 0]), abs(ground.point("9.1")[0]) + 0.018, 0.008)
+    up = np.interp(at[:, 1], [lip[1] - 0.002, base, tip[1], ROOT], [0, 1, 1, 0])
+    # Below the nose, where skin is stretched, more of it goes along.
+    spread = STRETCHED * smooth(at[:, 1], base + 0.006, base - 0.004)
+    share = smooth(np.abs(at[:, 0]), abs(ground.point("9.1")[0]) + 0.018 + spread, 0.008 - spread / 2)
     field = (up * share * still)[:, None] * UP
     out[63] = scaled(ground.smoothed(field, 3), points["9.3"], UP)
     return out

@@ -70,8 +70,8 @@ def test_studio_gives_the_shape_of_the_face(ada) -> None:  # type: ignore[no-unt
 
 def test_studio_scores_one_fap(ada) -> None:  # type: ignore[no-untyped-def]
     asking, head = ada
-    fine = asking("score", faps=[31], setup=moved(head, 31, 32), keep=True)["scores"]
-    tiny = asking("score", faps=[31], setup=moved(head, 31, 32, size=0.004), keep=True)["scores"]
+    fine = asking("score", faps=[65], setup=moved(head, 65, 66), keep=True)["scores"]
+    tiny = asking("score", faps=[65], setup=moved(head, 65, 66, size=0.004), keep=True)["scores"]
     assert [row["score"] for row in fine] == [3, 3]
     assert tiny[0]["score"] < 3
     assert "neighbours move apart" in tiny[0]["why"][-1]
