@@ -17,10 +17,10 @@ FAPS = 68
 # Rows after the FAPs': they are multiplied by 1 - cos and sin of an angle, the last by metres.
 JAW_COS, JAW_SIN, TONGUE_COS, TONGUE_SIN, JAW_DROP = range(FAPS, FAPS + 5)
 # BEYOND + FAP is the number of the row that is added for what the FAP exceeds its limit here, in FAPU, the
-# most that action units ask for: more skin around goes along then.
+# most that action units, visemes and emotions ask for: more skin around goes along then.
 BEYOND = FAPS + 5
 LIMITS = {
-    **{6: 165, 7: 165, 53: 155, 54: 155, 15: 150}, **{37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305},
+    **{6: 185, 7: 185, 53: 185, 54: 185, 15: 150}, **{37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305},
     **{61: 80, 62: 80, 63: 110, 18: 195},
 }  # fmt: skip
 ROWS = BEYOND + FAPS

@@ -8,9 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realizer.animation.lips.visemes import mouth_faps, shape_table
 from realizer.core.errors import FaceError
 from realizer.face.basis import (
     JAW_COS,
+    LIMITS,
     basis_from,
     bulge_at,
     pack,
@@ -18,6 +20,7 @@ from realizer.face.basis import (
 )
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
+from realizer.tables import au_to_fap
 
 
 @pytest.fixture(scope="module")
@@ -103,3 +106,10 @@ def test_bulge_at_is_how_far_the_cornea_comes_out_there() -> None:
     assert bulge_at(bulge, places, ahead) == pytest.approx([0.001, 0.0005])
     assert bulge_at(bulge, places, up) == pytest.approx([0.0005, 0.001])
     assert bulge_at(bulge, places * [1, -1, 1], up) == pytest.approx([0.0005, 0])
+
+
+def test_limits_are_what_action_units_and_visemes_stay_below() -> None:
+    visemes = mouth_faps(shape_table()[0])
+    for fap, most in LIMITS.items():
+        assert max(abs(row.fap_to) for row in au_to_fap() if row.fap == fap) <= most, fap
+        assert np.abs(visemes.get(fap, np.zeros(1))).max() <= most, fap

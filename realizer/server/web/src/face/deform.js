@@ -10,7 +10,7 @@ const NEIGHBOURS = {
 };
 const OPPOSITE = new Set([37, 38]);
 // FAPU beyond which a head's own shape takes more skin along, which the service computes.
-const LIMITS = { 6: 165, 7: 165, 53: 155, 54: 155, 15: 150, 37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305, 61: 80, 62: 80, 63: 110, 18: 195 };
+const LIMITS = { 6: 185, 7: 185, 53: 185, 54: 185, 15: 150, 37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305, 61: 80, 62: 80, 63: 110, 18: 195 };
 const PARTNER = new Map(Object.entries(OUTER).flatMap(([inner, outer]) => [[Number(inner), outer], [outer, Number(inner)]]));
 const ELASTICITY = 0.65; // most change of the distance between the lips' contours, of that distance
 const MIN_CHANGE = 0.05; // of the mouth's width
