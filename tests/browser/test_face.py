@@ -319,8 +319,8 @@ def test_accessories_and_marks_are_hidden_and_shown(tab: Tab) -> None:
 
 def test_score_by_rules_says_what_is_wrong(tab: Tab) -> None:
     tab.step("Zones")
-    tab.fap(31)
-    tab(f"{ROOM}.draft.set(31, {{ size: 0.003 }})")
+    tab.fap(65)
+    tab(f"{ROOM}.draft.set(65, {{ size: 0.003 }})")
     tab.page.click("text=Score this FAP")
     tab.page.locator(".face-why.low", has_text="neighbours move apart").wait_for()
 
