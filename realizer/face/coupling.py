@@ -66,32 +66,34 @@ def couple_lips(contours: Contours, rows: Float32) -> Float32:
     return out
 
 
-# FAP -> FAPU by which its value may be above and below those of its neighbours, and these: the most that
-# action units, visemes and emotions ask for. 37 and 38 go towards each other.
-NEIGHBOURS = {
-    **{31: (250, 250, 33, 32), 33: (180, 250, 31, 35), 35: (160, 160, 33), 37: (260, 260, 38)},
-    **{32: (250, 250, 34, 31), 34: (180, 250, 32, 36), 36: (160, 160, 34), 38: (260, 260, 37)},
-    **{4: (250, 230, 8, 9), 8: (200, 285, 4), 9: (200, 285, 4)},
-    **{5: (200, 265, 10, 11), 10: (275, 200, 5), 11: (275, 200, 5)},
-    **{51: (260, 190, 55, 56), 55: (235, 320, 51), 56: (235, 320, 51)},
-    **{52: (370, 265, 57, 58), 57: (345, 260, 52), 58: (345, 260, 52)},
-}
-OPPOSITE = 38
 FAR = 1e6  # FAPU between FAPs that do not depend on each other
+# Two FAPs of neighbouring points, and FAPU by which the first may go above and below the second: the most
+# that action units, visemes and emotions ask for. The other side is alike. 37 and 38 go together.
+NEIGHBOURS = (
+    *((31, 33, 180, 250), (31, 32, 250, 250), (33, 31, 180, 250), (33, 35, 100, 250), (35, 33, 160, 160)),
+    *((4, 8, 230, 250), (8, 4, 285, 200), (8, 12, FAR, 400), (37, 38, 260, 260)),
+    *((5, 10, 200, 265), (10, 5, 275, 200), (10, 12, 310, FAR)),
+    *((51, 55, 190, 260), (55, 51, 320, 235), (55, 59, FAR, 450)),
+    *((52, 57, 370, 265), (57, 52, 345, 260), (57, 59, 400, FAR)),
+)
 
 
 @cache
 def _limits() -> tuple[Int32, Float32, Float32]:
-    """Return columns (k,), 1 or -1 for each, and the limits above and below (2, k, k), the leader last."""
-    numbers = sorted(NEIGHBOURS)
-    most = np.full((2, len(numbers), len(numbers)), FAR, np.float32)
-    most[:, range(len(numbers)), range(len(numbers))] = 0
-    for number, (above, below, *others) in NEIGHBOURS.items():
-        most[:, [numbers.index(other) for other in others], numbers.index(number)] = [[above], [below]]
-    for middle in range(len(numbers)):
+    """Return columns (k,), -1 for FAPs that go down or left, and limits (2, k, k), the first FAP last."""
+    table = faps()
+    pairs = {pair[:2]: pair[2:] for pair in NEIGHBOURS}
+    pairs |= {(table[a - 1].mirror, table[b - 1].mirror): most for (a, b), most in pairs.items()}
+    columns = np.unique(np.array(list(pairs), np.int32)) - 1
+    most = np.full((2, len(columns), len(columns)), FAR, np.float32)
+    most[:, range(len(columns)), range(len(columns))] = 0
+    for pair, values in pairs.items():
+        one, other = np.searchsorted(columns, np.array(pair) - 1)
+        most[:, other, one] = values
+    for middle in range(len(columns)):
         most = np.minimum(most, most[:, :, middle, None] + most[:, middle, None])
-    columns = np.array(numbers, np.int32) - 1
-    return columns, np.where(columns == OPPOSITE - 1, -1, 1).astype(np.float32), most
+    ways = [-1 if table[column].direction in ("down", "left") else 1 for column in columns]
+    return columns, np.array(ways, np.float32), most
 
 
 def join_neighbours(rows: Float32) -> Float32:

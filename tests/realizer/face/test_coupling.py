@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import json
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import realizer
 from realizer.animation.lips.visemes import lip_shapes, mouth_faps, shape_table
-from realizer.face.coupling import CONTOURS, Contours, contours_of, couple_lips, join_neighbours
+from realizer.face.basis import LIMITS
+from realizer.face.coupling import (
+    CONTOURS,
+    FAR,
+    NEIGHBOURS,
+    Contours,
+    contours_of,
+    couple_lips,
+    join_neighbours,
+)
 from realizer.face.load import load_face
 from realizer.tables import au_to_fap, faps
 from tests.shipped import FACES
@@ -72,12 +86,18 @@ def test_join_neighbours_leaves_what_action_units_and_visemes_ask_for() -> None:
 
 def test_join_neighbours_takes_neighbours_along_with_a_point_that_goes_far() -> None:
     got = join_neighbours(rows({33: 512}))[0]
-    assert got[[30, 32, 34]].tolist() == [512 - 180, 512, 512 - 180]
+    assert got[[30, 32, 34]].tolist() == [512 - 180, 512, 512 - 100]
     assert got[31] == 512 - 180 - 250
     assert join_neighbours(rows({37: 512}))[0][37] == 260 - 512
     assert join_neighbours(rows({33: -512}))[0][30] == 250 - 512
     for fap in range(3, 69):
         assert join_neighbours(rows({fap: -512}))[0, fap - 1] == -512
+
+
+def test_join_neighbours_takes_a_corner_along_with_half_a_lip() -> None:
+    got = join_neighbours(rows({8: 512}))[0]
+    assert got[[3, 7, 11]].tolist() == [512 - 200, 512, 400 - 512]
+    assert not join_neighbours(rows({8: -512}))[0, 11]
 
 
 def test_join_neighbours_lets_opposite_brows_meet_half_way() -> None:
@@ -89,3 +109,14 @@ def test_join_neighbours_treats_both_sides_alike() -> None:
     for fap in (31, 33, 35, 37, 8, 10, 55, 57):
         here, there = (join_neighbours(rows({n: 512}))[0] for n in (fap, faps()[fap - 1].mirror))
         assert all(here[row.fap - 1] == there[row.mirror - 1] for row in faps())
+
+
+def test_neighbours_and_limits_are_those_of_the_page() -> None:
+    text = (Path(realizer.__file__).parent / "server/web/src/face/deform.js").read_text("utf-8")
+    found = re.search(r"NEIGHBOURS = (\[.*?\]);", text, re.DOTALL)
+    limits = re.search(r"LIMITS = {(.*?)}", text)
+    assert found
+    assert limits
+    pairs = json.loads(found[1].replace("Infinity", str(FAR)).replace(",\n]", "]"))
+    assert {tuple(pair) for pair in pairs} == set(NEIGHBOURS)
+    assert {int(key): int(most) for key, most in re.findall(r"(\d+): (\d+)", limits[1])} == LIMITS

@@ -1,14 +1,12 @@
 // The vertices of a head under one FAP, by the formulas of realizer/face (deform.py, basis.py).
 
 const OUTER = { 4: 51, 5: 52, 6: 53, 7: 54, 8: 55, 9: 56, 10: 57, 11: 58, 12: 59, 13: 60 };
-// FAP -> FAPU by which its value may be above and below those of its neighbours, and these; 37 and 38 go towards each other.
-const NEIGHBOURS = {
-  31: [250, 250, 33, 32], 33: [180, 250, 31, 35], 35: [160, 160, 33], 37: [260, 260, 38],
-  32: [250, 250, 34, 31], 34: [180, 250, 32, 36], 36: [160, 160, 34], 38: [260, 260, 37],
-  4: [250, 230, 8, 9], 8: [200, 285, 4], 9: [200, 285, 4], 5: [200, 265, 10, 11], 10: [275, 200, 5], 11: [275, 200, 5],
-  51: [260, 190, 55, 56], 55: [235, 320, 51], 56: [235, 320, 51], 52: [370, 265, 57, 58], 57: [345, 260, 52], 58: [345, 260, 52],
-};
-const OPPOSITE = new Set([37, 38]);
+// Two FAPs of neighbouring points, and FAPU by which the first may go above and below the second; the other side is alike.
+const NEIGHBOURS = [
+  [31, 33, 180, 250], [31, 32, 250, 250], [33, 31, 180, 250], [33, 35, 100, 250], [35, 33, 160, 160], [37, 38, 260, 260],
+  [4, 8, 230, 250], [8, 4, 285, 200], [8, 12, Infinity, 400], [5, 10, 200, 265], [10, 5, 275, 200], [10, 12, 310, Infinity],
+  [51, 55, 190, 260], [55, 51, 320, 235], [55, 59, Infinity, 450], [52, 57, 370, 265], [57, 52, 345, 260], [57, 59, 400, Infinity],
+];
 // FAPU beyond which a head's own shape takes more skin along, which the service computes.
 const LIMITS = { 6: 185, 7: 185, 53: 185, 54: 185, 15: 150, 37: 130, 38: 130, 39: 80, 40: 80, 41: 305, 42: 305, 61: 80, 62: 80, 63: 110, 18: 195 };
 const PARTNER = new Map(Object.entries(OUTER).flatMap(([inner, outer]) => [[Number(inner), outer], [outer, Number(inner)]]));
@@ -25,21 +23,18 @@ export function fapuOf(points) {
 
 export const beyond = ([fap, value]) => Math.abs(value) > LIMITS[fap];
 
-// FAP -> how far each point is behind one that moves far, up or down.
-function behind(fap, value) {
-  const found = new Map([[fap, 0]]);
-  for (const [one, off] of found) {
-    const [above, below, ...others] = NEIGHBOURS[one] ?? [0, 0];
-    for (const other of others) if (!found.has(other)) found.set(other, off + (value > 0 ? above : below));
-  }
-  return found;
-}
-
 const shrunk = (value, by) => Math.sign(value) * Math.max(0, Math.abs(value) - by);
 
 // The values that move when one FAP has a value: points and contours of the lips follow those that go too far.
 export function coupled(fap, value, points, rows) {
-  return [...behind(fap, value)].flatMap(([one, off]) => contours(one, shrunk(value, off) * (one !== fap && OPPOSITE.has(one) ? -1 : 1), points, rows));
+  const way = (n) => (n === 38 || rows.get(n)?.way[1] < 0 ? -1 : 1);
+  const side = (pair, of) => (of ? pair : [...pair.slice(0, 2).map((n) => rows.get(n).mirror), ...pair.slice(2)]);
+  const found = new Map([[fap, 0]]);
+  for (const [one, off] of found)
+    for (const pair of NEIGHBOURS)
+      for (const [leader, other, above, below] of [side(pair, true), side(pair, false)])
+        if (leader === one && !found.has(other)) found.set(other, off + (value * way(fap) > 0 ? above : below));
+  return [...found].flatMap(([one, off]) => contours(one, shrunk(value, off) * way(fap) * way(one), points, rows));
 }
 
 function contours(fap, value, points, rows) {
