@@ -47,9 +47,9 @@ def test_folds_show_by_how_far_the_brows_are_squeezed(face):
 
 def test_folds_of_one_side_show_on_that_side(face):
     folds = Folds(face)
-    raised = folds(pose(face, fap31=300))
+    raised = folds(pose(face, fap31=240))
     assert raised[2] > 0.5
-    assert not folds(pose(face, fap32=300))[2]
+    assert not folds(pose(face, fap32=240))[2]
 
 
 @pytest.mark.parametrize("name", FACES)
