@@ -177,9 +177,9 @@ def test_bml_face_drives_shapes_eyes_and_head(show, avatar, opened) -> None:  # 
 
 def test_bml_face_says_what_failed_and_recovers(show, site) -> None:  # type: ignore[no-untyped-def]
     page = show("foreign.glb")
-    said = "() => face.shadowRoot.querySelector('p').textContent"
+    said = "() => face.shadowRoot.querySelector('[part=error]').textContent"
     page.evaluate("face.addEventListener('error', ({ message }) => (globalThis.heard = message))")
-    page.wait_for_function("face.shadowRoot?.querySelector('p').textContent")
+    page.wait_for_function("face.shadowRoot?.querySelector('[part=error]').textContent")
     assert "wanted morph targets with ARKit's names, such as jawOpen" in page.evaluate(said)
     assert page.evaluate(said).endswith("got grin")
     for avatar in ("broken.glb", "none.glb", ""):
@@ -198,12 +198,12 @@ def test_bml_face_says_that_there_is_no_service(show, site) -> None:  # type: ig
     page.wait_for_function("said.length > 1")
     (said,) = set(page.evaluate("said"))
     assert said == "no service at ws://127.0.0.1:1, or it refuses this page; trying again"
-    assert page.evaluate("face.shadowRoot.querySelector('p').textContent") == said
+    assert page.evaluate("face.shadowRoot.querySelector('[part=error]').textContent") == said
     page.evaluate("face.setAttribute('url', 'ftp:nowhere')")
-    page.wait_for_function("face.shadowRoot.querySelector('p').textContent.includes('ftp')")
+    page.wait_for_function("face.shadowRoot.querySelector('[part=error]').textContent.includes('ftp')")
 
 
-SAID = "face.shadowRoot?.querySelector('p').textContent"
+SAID = "face.shadowRoot?.querySelector('[part=error]').textContent"
 
 
 def test_bml_face_says_that_a_token_is_missing_or_wrong(show) -> None:  # type: ignore[no-untyped-def]
@@ -239,6 +239,23 @@ def test_bml_face_says_that_its_page_was_opened_as_a_file(browser, address) -> N
     page.evaluate("globalThis.face = document.querySelector('bml-face')")
     page.wait_for_function(f"{SAID}?.includes('opened as a file')")
     page.close()
+
+
+def test_bml_face_shows_words_as_they_are_spoken(show) -> None:  # type: ignore[no-untyped-def]
+    page = loaded(show("plate.glb"))
+    page.evaluate("""face.setAttribute('captions', '');
+      globalThis.lines = new Set();
+      const captions = face.shadowRoot.querySelector('[part=captions]');
+      new MutationObserver(() => lines.add(captions.textContent)).observe(captions, { childList: true });""")
+    text = "This is a sentence which is longer than a line of captions."
+    page.evaluate(
+        f'void face.realizer.play(\'<bml id="c"><speech id="s"><text>{text}</text></speech></bml>\')'
+    )
+    page.wait_for_function("lines.has('')")  # after the last word
+    lines = page.evaluate("[...lines]")
+    assert "This is a sentence" in lines
+    assert lines[-2:] == ["line of captions", ""]
+    assert max(map(len, lines)) <= 42
 
 
 def test_bml_face_follows_its_attributes_and_size(show) -> None:  # type: ignore[no-untyped-def]

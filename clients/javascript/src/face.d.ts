@@ -20,7 +20,7 @@ export class Avatar {
   dispose(): void;
 }
 
-/** The element `<bml-face url session token character avatar muted>`; it fires `load` and `error`. */
+/** The element `<bml-face url session token character avatar muted captions>`; it fires `load` and `error`. */
 export class BmlFace extends HTMLElement {
   /** The client of the session; null while the element is in no page. */
   readonly realizer: Realizer | null;

@@ -17,23 +17,28 @@ const ANGLE = 20; // degrees, of the camera
 const AROUND = 2; // height of the picture in heights of the part of the face that moves
 const ABOVE = 0.08; // of these heights, from its middle to that of the picture
 const KEPT = 1; // s; older frames are dropped
+const LINE = 42; // characters of a line of captions, as in subtitles
+const READING = 1; // s; so long a line stays after its last word
 const GESTURES = ["pointerdown", "keydown"];
 const STYLE = `
   :host { display: block; position: relative; min-width: 1px; min-height: 1px; aspect-ratio: 1; }
   :host([hidden]) { display: none; }
   canvas { position: absolute; width: 100%; height: 100%; }
-  p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em; font: 14px/1.4 sans-serif; color: #fff; background: #8b1a1acc; overflow-wrap: anywhere; }
+  p { position: absolute; inset: auto 0 0 0; margin: 0; padding: 0.5em; font: 14px/1.4 sans-serif; color: #fff; overflow-wrap: anywhere; }
+  [part="error"] { background: #8b1a1acc; }
+  [part="captions"] { background: #000a; text-align: center; }
   p:empty { display: none; }`;
 
 /**
  * Attributes: `url` of the service's WebSocket (default: the service that this file comes from), `session`, `token`,
- * `character`, `avatar` (address of a .glb or .vrm file), `muted`. All may change at any time.
+ * `character`, `avatar` (address of a .glb or .vrm file), `muted`, `captions` (shows words as they are spoken, part `captions`). All
+ * may change at any time.
  *
  * Events: `load` when an avatar is shown, `error` with `message` when something failed, which is also written below the
  * avatar; part `error` styles it.
  */
 export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
-  static observedAttributes = ["url", "session", "token", "character", "avatar", "muted"];
+  static observedAttributes = ["url", "session", "token", "character", "avatar", "muted", "captions"];
   /** The client of the session, a `Realizer`; null while the element is in no page. */
   realizer = null;
   /** The avatar that is shown, an `Avatar`; null before it is loaded. */
@@ -43,6 +48,7 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
   #sound = new Sound(this.#clock);
   #frames = [];
   #names = [];
+  #captions = new Map(); // block -> { start, end, lines: [[{ start, end, text }, ...], ...] }
   #changed = new Set();
   #live = false; // from `connectedCallback` on, which comes after the first `attributeChangedCallback`
   #faults = new Map(); // what failed -> message
@@ -50,7 +56,7 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
 
   connectedCallback() {
     const root = this.shadowRoot ?? this.attachShadow({ mode: "open" });
-    root.innerHTML = `<style>${STYLE}</style><canvas role="img" aria-label="a talking face"></canvas><p part="error" role="alert"></p>`;
+    root.innerHTML = `<style>${STYLE}</style><canvas role="img" aria-label="a talking face"></canvas><p part="captions"></p><p part="error" role="alert"></p>`;
     for (const type of GESTURES) document.addEventListener(type, this.#start);
     try {
       this.#three = this.#stage(root.querySelector("canvas"));
@@ -160,11 +166,14 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
     const chosen = character === undefined ? {} : { character };
     realizer.arkit({ ahead: 0, fps: FPS, ...chosen }, take).catch(fail);
     realizer.sound({ rate: this.#sound.rate, ...chosen }, play).catch(fail);
+    const plan = (message) => this.realizer === realizer && this.#plan(message);
+    if (this.hasAttribute("captions")) realizer.subscribe("schedule", chosen, plan).catch(fail);
     this.#unmute();
   }
 
   #reset() {
     this.#frames = [];
+    this.#captions.clear();
     this.#clock.reset();
     this.#sound.reset();
   }
@@ -214,9 +223,34 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
     this.#frames.push({ time: frame.time, values: frame.values() });
   }
 
+  /** Take the words of the blocks of a message `schedule`. A block whose times have not changed comes without them. */
+  #plan({ whole, blocks }) {
+    if (whole) this.#captions.clear();
+    for (const { block, start, end, behaviours } of blocks) {
+      const words = behaviours?.flatMap(({ words = [] }) => words);
+      this.#captions.set(block, { start, end, lines: words ? linesOf(words) : (this.#captions.get(block)?.lines ?? []) });
+    }
+  }
+
+  /** Return the words of the present line that have begun. */
+  #caption(time) {
+    let said = "";
+    for (const [block, { start, end, lines }] of this.#captions) {
+      if (start === null || time === null) continue;
+      const heard = Math.min(time, end ?? time) - start;
+      const begun = lines.findLast(([first]) => first.start <= heard)?.filter((word) => word.start <= heard);
+      if (begun && time - start < begun.at(-1).end + READING) said = begun.map(({ text }) => text).join(" ");
+      if (end !== null && time > end + KEPT + READING) this.#captions.delete(block);
+    }
+    return said;
+  }
+
   /** Show the values at the time that is heard, between two frames. */
   #show(passed) {
     const time = this.#sound.playhead() ?? this.#clock.playhead(performance.now() / 1000);
+    const captions = this.shadowRoot.querySelector("[part=captions]");
+    const said = this.#caption(time);
+    if (captions.textContent !== said) captions.textContent = said;
     if (!this.avatar || !this.#frames.length || !this.#names.length) return;
     const next = this.#frames.findIndex((frame) => frame.time > time);
     const b = this.#frames.at(next);
@@ -236,8 +270,23 @@ export class BmlFace extends (globalThis.HTMLElement ?? class {}) {
   }
 
   #write() {
-    this.shadowRoot.querySelector("p").textContent = [...this.#faults.values()].join("\n");
+    this.shadowRoot.querySelector("[part=error]").textContent = [...this.#faults.values()].join("\n");
   }
+}
+
+/** Group words in lines of at most `LINE` characters. */
+function linesOf(words) {
+  const lines = [];
+  let length = LINE;
+  for (const word of words) {
+    length += 1 + word.text.length;
+    if (length > LINE) {
+      lines.push([]);
+      length = word.text.length;
+    }
+    lines.at(-1).push(word);
+  }
+  return lines;
 }
 
 globalThis.customElements?.get("bml-face") ?? globalThis.customElements?.define("bml-face", BmlFace);
