@@ -320,6 +320,22 @@ def test_page_shows_a_face_that_another_client_chose(page) -> None:  # type: ign
     assert width == pytest.approx(vertices.max(), abs=0.01), "by the scale of that face"
 
 
+def test_page_says_that_the_service_refuses_it(browser) -> None:  # type: ignore[no-untyped-def]
+    command = [sys.executable, "-m", "realizer", "serve", "--port", "0", "--voice", "silent"]
+    refused = {
+        "": "token: wanted",
+        "?token=x": "token: wanted",
+        "?token=Xk-7&session=a%20b": "session: wanted",
+    }
+    with serving([*command, "--token", "Xk-7"]) as address:
+        for query, reason in refused.items():
+            page = browser.new_page(bypass_csp=True)
+            page.goto(f"{address}/{query}")
+            page.locator("#stage-note", has_text=reason).wait_for(timeout=PATIENCE)
+            assert page.locator("#status-text").text_content() == "Refused"
+            page.close()
+
+
 def test_page_shows_a_moving_face(page) -> None:  # type: ignore[no-untyped-def]
     mine = page.locator("#faces button:first-child").text_content().lower()
     page.wait_for_function(f"realizerPage.stage.name === '{mine}' && realizerPage.stage.shownFrames > 5")

@@ -65,7 +65,7 @@ link.onopen = () => {
 };
 link.onlost = (error) => {
   mirror.stop();
-  status("lost", error?.message ?? "Reconnecting");
+  status("lost", error ? "Refused" : "Reconnecting");
   if (error) at("stage-note").textContent = error.message;
 };
 link.onfeedback = (element, seq) => {
