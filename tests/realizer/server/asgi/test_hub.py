@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator
 
 import pytest
-from websockets.exceptions import InvalidStatus
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 pytest.importorskip("starlette", reason="needs the asgi extra")
@@ -44,6 +44,11 @@ def test_hub_asks_for_a_token(serve) -> None:
         with pytest.raises(InvalidStatus) as refused:
             connect(app.url.replace("http", "ws") + "/ws?token=wrong", open_timeout=LIMIT)
         assert refused.value.response.status_code == 401
+        wrong, page = app.url.replace("http", "ws") + "/ws?token=wrong", "http://localhost:3000"
+        with connect(wrong, origin=page, open_timeout=LIMIT) as socket:  # type: ignore[arg-type]
+            assert '"code":"token"' in str(socket.recv(LIMIT))
+            with pytest.raises(ConnectionClosed, match="1008"):
+                socket.recv(LIMIT)
 
 
 @pytest.mark.parametrize("passes_lifespan_on", [True, False])
