@@ -15,6 +15,7 @@ OPTIONS: Any = {
     "nogil": True,
     "_nrt": False,
     "forceinline": True,
+    "no_cfunc_wrapper": True,
     "error_model": "numpy",
     "fastmath": {"contract", "reassoc", "arcp", "nsz"},
 }
@@ -24,6 +25,8 @@ Loop = TypeVar("Loop", bound=Callable[..., Any])
 def compiled(loop: Loop) -> Loop:
     """Return a loop as machine code, which is cached on disk if possible.
 
+    Python cannot call one whose name begins with "_"; it is compiled sooner.
+
     Raises:
         RenderError: numba is not installed; the text says what to install.
     """
@@ -31,12 +34,13 @@ def compiled(loop: Loop) -> Loop:
         import numba
     except ImportError as error:
         raise RenderError(f"{NO_NUMBA} ({error})") from None
+    options = {**OPTIONS, "no_cpython_wrapper": loop.__name__.startswith("_")}
     try:
-        fast: Any = numba.njit(cache=True, **OPTIONS)(loop)
+        fast: Any = numba.njit(cache=True, **options)(loop)
         # Numba compiles again when the loop's own file is newer; loops also use those of other files.
         fast._cache._cache_file._source_stamp = state_of_sources()
     except RuntimeError:  # neither our folder nor the user's can be written
-        fast = numba.njit(**OPTIONS)(loop)
+        fast = numba.njit(**options)(loop)
     fast._compiler._customize_flags = _apart
     typed: Loop = fast
     return typed
@@ -53,9 +57,7 @@ def state_of_sources(folder: Path = Path(__file__).parent) -> str:
     """Return a digest of the files of a folder of ours that hold loops, and of those that they import."""
     texts = [path.read_text("utf-8") for path in sorted(folder.glob("*.py"))]
     loops = [text for text in texts if "\n@compiled\n" in text]
-    imports = re.compile(r"^from realizer\.(\S+) import (\w+)", re.MULTILINE)
-    pairs = [pair for text in loops for pair in imports.findall(text)]
-    names = {name for package, name in pairs for name in (package, f"{package}.{name}")}
+    names = {name for text in loops for name in re.findall(r"^from realizer\.(\S+)", text, re.MULTILINE)}
     files = (folder.parent / f"{name.replace('.', '/')}.py" for name in sorted(names))
     read = [path.read_text("utf-8") for path in files if path.is_file()]
     return hashlib.sha256("\0".join([*loops, *read]).encode()).hexdigest()

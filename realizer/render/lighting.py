@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from realizer.face.drawn_mesh import EYE, HAIR
-from realizer.render import textures as maps
 from realizer.render.compiled import compiled
 from realizer.render.shading import BRIGHTEST, STEPS, dot, mirrored, reflected, unit
 from realizer.render.shadows import reach
 from realizer.render.surfaces import BENT, BOWL
+from realizer.render.textures import DEPTH, FOLD_SHADE, IRIS, STEEPEST, THICKNESS
 from realizer.render.visibility import SAMPLES, level_of
 
 # Samples of one kind are lit once where their nearness differs by less than this share, and the green of
@@ -18,7 +18,7 @@ from realizer.render.visibility import SAMPLES, level_of
 SAME, TINT = np.float32(8e-4), np.float32(0.05)
 SETUPS = 512  # triangles whose setup a thread keeps
 # Rows of points that are lit together, and columns of a setup: what is fixed and what moves, then what is the
-# same all over a triangle: directions in which u and v grow, their scale, and the level of the maps.
+# same all over a triangle: directions in which u and v grow, their scale, and the level of the
 UV, COLOUR, OCCLUDED, ROUGH, PLACE, NORMAL, FOLD, STRAND = 0, 2, 5, 6, 7, 10, 13, 14
 VARIED, ALONG, DOWN, SCALE, LEVEL, REACHED, ROWS = 17, 17, 20, 23, 24, 27, 28
 # In a setup the former are those of the first corner. Steps to the two others follow, the place of the corner
@@ -45,15 +45,22 @@ def _taps(texels: Any, level: Any, u: Any, v: Any) -> Any:
 
 
 @compiled
-def _mixed(texel: Any, channel: Any) -> Any:
-    """Return a channel of the maps, 0..255, between four texels, as `_taps` returns them."""
-    texels, (a, b, c, d), (wa, wb, wc, wd) = texel
-    word, low = np.uint64(channel // 4), channel % 4 * 8
+def _mixed(texel: Any, k: Any) -> Any:
+    """Return channels 4 k to 4 k + 3 of the maps, 0..255, between four texels, as `_taps` returns them."""
+    texels, (a, b, c, d), w = texel
+    word = np.uint64(k)
+    four = texels[a, word], texels[b, word], texels[c, word], texels[d, word]
+    return _byte(four, w, 0), _byte(four, w, 8), _byte(four, w, 16), _byte(four, w, 24)
+
+
+@compiled
+def _byte(words: Any, weights: Any, low: Any) -> Any:
+    """Return the mean of the bytes of four words that begin at bit `low`."""
     return (
-        wa * np.float32(np.int32(texels[a, word] >> low & 255))
-        + wb * np.float32(np.int32(texels[b, word] >> low & 255))
-        + wc * np.float32(np.int32(texels[c, word] >> low & 255))
-        + wd * np.float32(np.int32(texels[d, word] >> low & 255))
+        weights[0] * np.float32(np.int32(words[0] >> low & 255))
+        + weights[1] * np.float32(np.int32(words[1] >> low & 255))
+        + weights[2] * np.float32(np.int32(words[2] >> low & 255))
+        + weights[3] * np.float32(np.int32(words[3] >> low & 255))
     )
 
 
@@ -153,18 +160,19 @@ def _lit(points: Any, count: Any, surface: Any, hair: Any, coat: Any, view: Any)
         texel = _taps(texels, _row(points, LEVEL, i), u, v)
         su = sv = np.float32(0)
         if coat:
-            thick = _mixed(texel, maps.THICKNESS)
-            depth = (
-                np.float32(maps.DEPTH) * (one - thick * byte) if thick < np.float32(254) else np.float32(0)
-            )
+            thick = _mixed(texel, THICKNESS // 4)[THICKNESS % 4]
+            depth = np.float32(DEPTH) * (one - thick * byte) if thick < np.float32(254) else np.float32(0)
             dive = points[SCALE * ROOM + i] * _dive(depth, smooth, towards)
             u, v = u - dive * dot(towards, along), v - dive * dot(towards, down)
             texel = _taps(texels, _row(points, LEVEL, i), u, v)
-            bowl = np.float32(BOWL / maps.IRIS[2]) * min(depth / np.float32(0.0004), one)
-            su, sv = bowl * (u - np.float32(maps.IRIS[0])), bowl * (v - np.float32(maps.IRIS[1]))
-        scale = np.float32(maps.STEEPEST / 127)
-        su += scale * (_mixed(texel, maps.SLOPE_U) - level + (_mixed(texel, maps.FOLD_U) - level) * fold)
-        sv += scale * (_mixed(texel, maps.SLOPE_V) - level + (_mixed(texel, maps.FOLD_V) - level) * fold)
+            bowl = np.float32(BOWL / IRIS[2]) * min(depth / np.float32(0.0004), one)
+            su, sv = bowl * (u - np.float32(IRIS[0])), bowl * (v - np.float32(IRIS[1]))
+        scale = np.float32(STEEPEST / 127)
+        red, green, blue, _ = _mixed(texel, 0)
+        slope_u, slope_v, open_share, roughness = _mixed(texel, 1)
+        thickness, fold_u, fold_v, depth = _mixed(texel, 2)
+        su += scale * (slope_u - level + (fold_u - level) * fold)
+        sv += scale * (slope_v - level + (fold_v - level) * fold)
         relief = unit((
             smooth[0] - su * along[0] - sv * down[0],
             smooth[1] - su * along[1] - sv * down[1],
@@ -172,14 +180,14 @@ def _lit(points: Any, count: Any, surface: Any, hair: Any, coat: Any, view: Any)
         ))  # fmt: skip
         colour = _row(points, COLOUR, i)
         albedo = (
-            linear[np.uint64(_mixed(texel, maps.RED) + half)] * colour[0],
-            linear[np.uint64(_mixed(texel, maps.GREEN) + half)] * colour[1],
-            linear[np.uint64(_mixed(texel, maps.BLUE) + half)] * colour[2],
+            linear[np.uint64(red + half)] * colour[0],
+            linear[np.uint64(green + half)] * colour[1],
+            linear[np.uint64(blue + half)] * colour[2],
         )
-        occlusion = points[OCCLUDED * ROOM + i] * _mixed(texel, maps.OCCLUSION) * byte
-        occlusion *= one - np.float32(maps.FOLD_SHADE) * fold * _mixed(texel, maps.FOLD) * byte
-        rough = max(points[ROUGH * ROOM + i] * _mixed(texel, maps.ROUGHNESS) * byte, np.float32(0.06))
-        values = occlusion, rough, _mixed(texel, maps.THICKNESS) * byte, points[REACHED * ROOM + i]
+        occlusion = points[OCCLUDED * ROOM + i] * open_share * byte
+        occlusion *= one - np.float32(FOLD_SHADE) * fold * depth * byte
+        rough = max(points[ROUGH * ROOM + i] * roughness * byte, np.float32(0.06))
+        values = occlusion, rough, thickness * byte, points[REACHED * ROOM + i]
         normals = relief, smooth, _row(points, STRAND, i)
         light, around, share = reflected(surface, hair, coat, albedo, normals, values, towards, lights)
         points[LIGHT * ROOM + i], points[(LIGHT + 1) * ROOM + i], points[(LIGHT + 2) * ROOM + i] = light

@@ -127,23 +127,26 @@ def by_card(rows, kind, light, lamp, depths):
 @pytest.mark.parametrize("name", presets())
 @pytest.mark.parametrize("kind", [SKIN, EYE, HAIR, WET, CLOTH])
 def test_surface_glsl_is_the_formula_of_the_processor(numbers, kind, name):
-    from realizer.render.lighting import reach
     from realizer.render.raster import lights_of
-    from realizer.render.shading import reflected
+    from realizer.render.shading import mirrored, reflected
+    from realizer.render.shadows import ends_around, reach
 
     light = presets()[name]
     lamp = LampView(light.key.direction, (-1, -1, -1), (1, 1, 1))
     steps = np.random.default_rng(6).random((SIDE // 8, SIDE // 8), np.float32)
     depths = np.ascontiguousarray(np.kron(steps, np.ones((16, 16), np.float32)))
     four = depths.reshape(SIDE, 2, SIDE, 2).transpose(0, 2, 1, 3).reshape(SIDE, SIDE, 4)
-    lights, row = lights_of(light), surfaces()[kind]
+    around = np.empty((SIDE, SIDE, 2), np.float32)
+    ends_around(np.stack([four.min(axis=2), four.max(axis=2)], axis=2), (0, SIDE), around)
+    (lights, levels), row = lights_of(light), surfaces()[kind]
     wanted = []
     for albedo, n, even, strand, values, view, place in numbers:
         normals = tuple(n[:3]), tuple(even[:3]), tuple(strand[:3])
-        seen = reflected(
-            row, kind == HAIR, tuple(albedo[:3]), normals, tuple(values), tuple(view[:3]), lights
+        light_of, towards, share = reflected(
+            row, kind == HAIR, kind == EYE, tuple(albedo[:3]), normals, tuple(values), tuple(view[:3]), lights
         )
-        wanted.append((*seen, reach((four, lamp.matrix), tuple(place[:3]), tuple(even[:3]))))
+        seen = np.array(light_of) + share * np.array(mirrored(levels, towards, values[1]))
+        wanted.append((*seen, reach((four, around, lamp.matrix), tuple(place[:3]), tuple(even[:3]))))
     found = by_card(numbers, kind, light, lamp, depths)
     assert found == pytest.approx(np.array(wanted), rel=4e-3, abs=2e-3)
 
