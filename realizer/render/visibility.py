@@ -33,6 +33,12 @@ def upwards(x: Any) -> Any:
 
 
 @compiled
+def place(points: Any, k: Any) -> Any:
+    """Return a point as two numbers."""
+    return points[k, 0], points[k, 1]
+
+
+@compiled
 def sort(
     points: Any, nearness: Any, triangles: Any, sides: Any, starts: Any, lists: Any, counts: Any
 ) -> None:
@@ -47,14 +53,7 @@ def sort(
     counts[:] = 0
     for t in range(len(triangles)):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
-        ax, ay, bx, by, cx, cy = (
-            points[a, 0],
-            points[a, 1],
-            points[b, 0],
-            points[b, 1],
-            points[c, 0],
-            points[c, 1],
-        )
+        (ax, ay), (bx, by), (cx, cy) = place(points, a), place(points, b), place(points, c)
         turn = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
         if turn < 0 or (turn > 0 and sides[t] & 1):
             top = np.ceil(min(ay, by, cy) * per - 0.5)
@@ -106,14 +105,7 @@ def fill(points: Any, nearness: Any, chosen: Any, mesh: Any, rows: Any, keys: An
             mid, low = low, mid
             if points[mid, 1] < points[high, 1]:
                 high, mid = mid, high
-        x0, y0, x1, y1, x2, y2 = (
-            points[high, 0],
-            points[high, 1],
-            points[mid, 0],
-            points[mid, 1],
-            points[low, 0],
-            points[low, 1],
-        )
+        (x0, y0), (x1, y1), (x2, y2) = place(points, high), place(points, mid), place(points, low)
         # Edges are computed from their upper end, so that neighbours get exactly the same values.
         long_slope = (x2 - x0) / (y2 - y0)
         long_at = x0 - long_slope * y0
