@@ -285,8 +285,8 @@ def test_check_gives_no_advice_on_foreign_attributes_and_usual_times(text: str, 
 
 
 def test_check_limits_the_advice_on_one_block(tmp_path: Path) -> None:
-    heads = "".join(f'<head id="h{n}" lexeme="NOD" start="1500"/>' for n in range(50))
-    assert check(tmp_path, f"{HEAD}{heads}</bml>").stderr.count("ADVICE") == 20
+    short = "".join(f'<head id="h{n}" lexeme="NOD" start="{n}" end="{n}.02"/>' for n in range(50))
+    assert check(tmp_path, f"{HEAD}{short}</bml>").stderr.count("ADVICE") == 20
 
 
 def test_check_shows_distant_faults_of_a_line_separately(tmp_path: Path) -> None:

@@ -79,10 +79,10 @@ def test_factory_begins_a_session_anew_after_an_internal_error(
 ) -> None:
     put = Submission.enqueue
 
-    def faulty(submission: Submission, text: str) -> None:
+    def faulty(submission: Submission, text: str, *sender: int) -> None:
         if "fault" in text:
             raise ZeroDivisionError
-        put(submission, text)
+        put(submission, text, *sender)
 
     monkeypatch.setattr(Submission, "enqueue", faulty)
 
