@@ -41,7 +41,8 @@ def compiled(loop: Loop) -> Loop:
         fast._cache._cache_file._source_stamp = state_of_sources()
     except RuntimeError:  # neither our folder nor the user's can be written
         fast = numba.njit(**options)(loop)
-    fast._compiler._customize_flags = _apart
+    if hasattr(fast, "_compiler"):  # not public; without it the loops are right, but slower
+        fast._compiler._customize_flags = _apart
     typed: Loop = fast
     return typed
 
