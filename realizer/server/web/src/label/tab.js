@@ -110,7 +110,8 @@ export class LabelTab {
     this.names = [...new Set(sound.flatMap(({ names }) => names))];
     this.find("");
     await this.read(at("label-recording").value);
-    if (wrong.length) this.tell(wrong.join("\n"), "bad");
+    // Reading takes its time, in which labels may be saved.
+    if (wrong.length) this.tell([at("label-status").textContent, ...wrong].filter(Boolean).join("\n"), "bad");
   }
 
   // Open a recording.
