@@ -5,7 +5,7 @@ import { pathToFileURL } from "node:url";
 
 const [, , folder, file] = process.argv;
 const module = (name) => import(pathToFileURL(`${folder}/${name}.js`).href);
-const [{ HeadMesh }, { fieldOf }, { coupled, fapuOf, keepLids, lidsOf }, { expanded }] = await Promise.all(["mesh", "zones", "deform", "draft"].map(module));
+const [{ HeadMesh }, { fieldOf }, { beyond, coupled, fapuOf, keepLids, lidsOf }, { expanded }] = await Promise.all(["mesh", "zones", "deform", "draft"].map(module));
 
 const TYPES = { f4: Float32Array, f8: Float64Array, u4: Uint32Array };
 const { buffer } = new Uint8Array(readFileSync(file));
@@ -31,8 +31,9 @@ for (const fap of setup.zones.keys())
   for (const value of new Set([...rows.get(fap).usual, 512])) {
     if (!value) continue;
     const at = mesh.vertices.slice();
-    for (const [one, far] of coupled(fap, value, points, rows)) if (far) field(one).forEach((x, i) => (at[i] += far * units[rows.get(one).unit] * x));
-    if (fap >= 19 && fap <= 22) keepLids(lids, at);
+    const moving = coupled(fap, value, points, rows);
+    for (const [one, far] of moving) if (far) field(one).forEach((x, i) => (at[i] += far * units[rows.get(one).unit] * x));
+    if ((fap >= 19 && fap <= 22) || moving.some(beyond)) keepLids(lids, at);
     out.push([fap, value, Buffer.from(Float32Array.from(at).buffer).toString("base64")]);
   }
 console.log(JSON.stringify(out));

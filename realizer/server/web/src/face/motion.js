@@ -58,9 +58,9 @@ export class Motion {
     return this.shapes.get(fap);
   }
 
-  // Whether what is shown moves lids, which slide over the eyeballs.
+  // Whether lids must slide over the eyeballs: what is shown moves them, or goes far beyond usual values.
   get blinks() {
-    return LIDS.has(this.fap) || (this.fap === UNIT && this.unit?.lids);
+    return LIDS.has(this.fap) || (this.fap === UNIT ? this.unit?.lids : this.moving.some(beyond));
   }
 
   get moving() {
