@@ -83,8 +83,7 @@ def realize(
         strict_bml=strict_bml,
     )
     documents = documents_of(source)
-    if options.media is None:
-        options = replace(options, media=folder_of(document.file for document in documents))
+    options = replace(options, media=options.media or folder_of(document.file for document in documents))
     played = pipeline.play([document.bml for document in documents], options, _checked(voice))
     if not played.schedules:
         raise first_error(documents, VOCABULARY, strict_bml=strict_bml)
@@ -112,8 +111,7 @@ def schedule(
     documents = documents_of(source)
     if len(documents) > 1:
         raise ValueError(f"source: wanted one document, got {len(documents)}")
-    if options.media is None:
-        options = replace(options, media=folder_of([documents[0].file]))
+    options = replace(options, media=options.media or folder_of([documents[0].file]))
     block = parse(documents[0].bml, VOCABULARY, strict_bml=strict_bml)
     player = Player(options, animates=False)
     with open_voice(_checked(voice)) as speaker:

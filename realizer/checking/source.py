@@ -43,11 +43,8 @@ def check(
     options = PlayOptions(scene=scene, media=media, expressions=expressions, strict_bml=strict_bml)
     found: list[Finding] = []
     for number, document in enumerate(documents_of(source), 1):
-        folder = options.media or folder_of([document.file])
-        player, name = (
-            Player(replace(options, media=folder), animates=False),
-            document.file or f"document {number}",
-        )
+        own = replace(options, media=options.media or folder_of([document.file]))
+        player, name = Player(own, animates=False), document.file or f"document {number}"
         found += findings_of(name, document.bml, player, MAX_ADVICE if advice else 0)
     return found
 

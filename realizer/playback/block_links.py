@@ -1,6 +1,6 @@
 """Links between a block and the active ones: dependencies, references, and what is solved together."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from math import inf
@@ -109,30 +109,32 @@ class ExternalTimes:
         Raises:
             LookupError: the block has no such behaviour or sync point; the message has the existing ones.
         """
-        planned = None
+        name, planned = ref.behaviour or "", None
         for look in (self.schedule_of, self.fallback):
             schedule = look(ref.block or "")
             if schedule is None or schedule.start == inf:
                 break
-            planned = planned or schedule
-            points = {"start": 0.0, "end": schedule.duration}
-            if ref.behaviour != "bml":
-                points = schedule[ref.behaviour or ""] if ref.behaviour in schedule.times else {}
+            points: Sequence[str] = schedule.points[name] if name in schedule.times else ()
+            if name == "bml":
+                points = ("start", "end")
             if ref.point in points:
-                return schedule.start + points[ref.point] + ref.offset - self.start
+                if name != "bml":
+                    time = schedule.at(name, ref.point)
+                else:
+                    time = 0.0 if ref.point == "start" else schedule.duration
+                return schedule.start + time + ref.offset - self.start
+            planned = planned or (schedule, points)
         if planned is not None:
-            raise LookupError(self._why_unknown(ref, planned))
+            raise LookupError(self._why_unknown(ref, *planned))
         return None
 
-    def _why_unknown(self, ref: SyncRef, schedule: Schedule) -> str:
-        name, names = ref.behaviour or "", ["start", "end"]
-        if name != "bml":
-            if name not in schedule.times:
-                self.suggestions -= 1
-                known = islice(schedule.times, 100) if self.suggestions >= 0 else ()
-                return f"{ref}: block {ref.block} has no behaviour {name}{did_you_mean(similar(name, known))}"
-            names = list(schedule.points[name])
-        return f"{ref}: {name} has no {ref.point}, only {', '.join(names)}"
+    def _why_unknown(self, ref: SyncRef, schedule: Schedule, points: Sequence[str]) -> str:
+        if points:
+            return f"{ref}: {ref.behaviour} has no {ref.point}, only {', '.join(points)}"
+        self.suggestions -= 1
+        known = islice(schedule.times, 100) if self.suggestions >= 0 else ()
+        near = did_you_mean(similar(ref.behaviour or "", known))
+        return f"{ref}: block {ref.block} has no behaviour {ref.behaviour}{near}"
 
 
 def with_stops(
