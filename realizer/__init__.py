@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from realizer.speech.registry import VoiceInfo as VoiceInfo
     from realizer.speech.registry import voices as voices
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 # The public names of each module, NAME or NAME=ATTRIBUTE, imported on first use: `import realizer` stays
 # quick, and works without the optional parts.
