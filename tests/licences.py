@@ -27,19 +27,19 @@ DATA = (
     ),
     (
         "realizer/tracking/weights.npz",
-        "trained by tests/benchmarks/train_action_units.py on pictures of our own heads",
+        "trained by training/train_action_units.py on pictures of our own heads",
         "MIT",
     ),
     (
         "realizer/speech/sound_visemes/weights.npz",
-        "trained by tests/benchmarks/train_sound_visemes.py on synthesized and recorded speech, of which it "
+        "trained by training/train_sound_visemes.py on synthesized and recorded speech, of which it "
         "contains nothing; weights.txt beside it names the voices",
         "MIT",
     ),
     (
         "realizer/tables/environments.npz",
         "panoramas of Poly Haven (polyhaven.com/hdris) in the npm package @pmndrs/assets 1.7.0, turned, "
-        "dimmed and filtered by tests/benchmarks/environments.py",
+        "dimmed and filtered by training/environments.py",
         "CC0-1.0",
     ),
     ("realizer/examples/*", "documents, and pictures drawn by the realizer", "MIT; pictures CC0-1.0"),

@@ -11,7 +11,7 @@ import socket
 import struct
 from pathlib import Path
 
-from tests.benchmarks.packets import HANDSHAKE, encode_text, handshake, take_messages
+from benchmarks.packets import HANDSHAKE, encode_text, handshake, take_messages
 from tests.feedback_log import seq_numbers
 
 __all__ = [

@@ -35,7 +35,7 @@ def test_each_package_has_its_folder_of_tests(package: str) -> None:
 
 def test_no_folder_of_tests_is_without_its_package() -> None:
     folders = {p.parent.relative_to(TESTS).as_posix() for p in TESTS.rglob("test_*.py")}
-    assert folders - set(packages()) <= {".", "browser", "benchmarks", "examples", "realizer/server/web"}
+    assert folders - set(packages()) <= {".", "browser", "examples", "realizer/server/web"}
 
 
 @pytest.mark.parametrize("path", sorted((TESTS / "realizer").glob("test_*.py")), ids=lambda p: p.stem)

@@ -20,7 +20,7 @@ def interval(
 
     Resampled units give its standard error, and Student's t the interval on the scale of log odds between the
     limits. Near a limit, plain percentiles hold the truth less often than they say
-    (`tests/benchmarks/study.py`).
+    (`benchmarks/study.py`).
 
     Args:
         units: (n, ...) the part of each judge, or of each item.

@@ -1,6 +1,6 @@
 """Action units, FAPs and the pose of the head from landmarks, by networks that we train on our own heads.
 
-`tests/benchmarks/train_action_units.py` trains them. The principal components of what `landmarks` sees are
+`training/train_action_units.py` trains them. The principal components of what `landmarks` sees are
 compared with those of the same person at rest; without a picture of it, a second network does its best.
 """
 

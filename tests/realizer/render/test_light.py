@@ -11,7 +11,7 @@ from realizer import tables
 from realizer.core.colours import linear, srgb
 from realizer.core.errors import RenderError
 from realizer.render.light import HEIGHT, LEVELS, WIDTH, Environment, environment_of, preset, presets, unit
-from tests.benchmarks.environments import directions_of
+from training.environments import directions_of
 
 AXES = np.vstack([np.eye(3), -np.eye(3)]).astype(np.float32)
 

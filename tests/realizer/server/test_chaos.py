@@ -25,13 +25,13 @@ from PIL import Image
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from benchmarks.packets import encode_text
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
 from realizer.server.serve import Server
 from realizer.speech.espeak.voice import EspeakVoice
 from tests.ahead import viewed
-from tests.benchmarks.packets import encode_text
 from tests.feedback_log import seq_numbers
 from tests.many_clients import (
     check_feedback,

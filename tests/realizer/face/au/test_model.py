@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from benchmarks.decimate import decimated
 from realizer.face.au.file import read_model
 from realizer.face.au.model import HeadTurn, Model, Mouth
 from realizer.face.au.units import units
@@ -11,7 +12,6 @@ from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.facebuild.au.fit import table, table_text
 from realizer.facebuild.au.measure import read_shapes
-from tests.benchmarks.decimate import decimated
 from tests.shipped import DEFAULT, FACES, FOLDERS
 
 FORMS = ("published", "extended")

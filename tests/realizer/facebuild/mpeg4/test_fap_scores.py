@@ -6,10 +6,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.face import PEERS
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.facebuild.mpeg4.fap_scores import FapScore, mean_score, score_faps
-from tests.benchmarks.face import PEERS
 from tests.shipped import DEFAULT, FACES
 
 pytestmark = pytest.mark.xdist_group("scores")

@@ -195,7 +195,7 @@ def test_marks_are_after_the_short_pause_before_a_word(
 def test_marks_of_five_languages_are_exact_to_five_milliseconds(
     voice: EspeakVoice,
 ) -> None:
-    path = Path(__file__).parents[3] / "benchmarks" / "marks.py"
+    path = Path(__file__).parents[4] / "benchmarks" / "marks.py"
     spec = importlib.util.spec_from_file_location("marks", path)
     assert spec is not None
     assert spec.loader is not None

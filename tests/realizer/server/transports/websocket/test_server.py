@@ -22,10 +22,10 @@ from websockets.asyncio.client import ClientConnection
 from websockets.asyncio.client import connect as dial
 from websockets.exceptions import InvalidStatus
 
+from benchmarks.packets import encode_text
 from realizer.core.settings import Settings
 from realizer.protocol.wire import HEADER, unpack
 from realizer.server.serve import Server
-from tests.benchmarks.packets import encode_text
 from tests.portraits import LITERT, faps_of, portrait
 from tests.programs import SERVE, running
 
