@@ -12,11 +12,12 @@ from bml_schema import CORE, Block, BMLError, Speech, read, write
 from bml_schema.behaviours import SpeechText
 from bml_schema.element_reader import Vocabulary
 from bml_schema.nodes import BMLT
+from realizer.core.sound_formats import SUFFIXES as SOUNDS
+from realizer.core.sound_formats import format_of
 
 Source = str | bytes | Path
 # Suffixes of documents. A text in a .txt file is spoken; those of timelines are read by `check`.
 SUFFIXES = (".txt", ".bml", ".xml", ".toml", ".json")
-SOUNDS = (".wav", ".flac", ".ogg", ".opus", ".mp3", ".webm")  # of recordings of speech
 LONGEST_PATH = 1024  # characters
 LONGEST = 10_000  # characters of one speech, as in `_PIECE`
 # A part of a long text: up to the last end of a sentence in it, or else the last blank, or else cut.
@@ -117,6 +118,8 @@ def document_of(item: object, number: int = 1) -> Document:
         if item.suffix.lower() in SOUNDS and item.is_file():
             return Document(recorded(item.name, number), str(item))
         content, is_text = item.read_bytes(), item.suffix.lower() == ".txt"
+        if format_of(content):  # with another suffix
+            return Document(recorded(item.name, number), str(item))
         return Document(_bml(content, number) if is_text else content, str(item))
     return Document(_bml(item, number), "")
 

@@ -52,7 +52,12 @@ def timing(node: AudioFile, context: PlanningContext) -> Timing:
 
 
 def check(node: AudioFile, context: PlanningContext) -> tuple[Fault, ...]:
-    return faults(node.file_name, context)
+    if found := faults(node.file_name, context):
+        return found
+    return tuple(
+        Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"fileName: {text}", fatal=False)
+        for text in recording(node.file_name, context).warnings
+    )
 
 
 def sound(node: AudioFile, context: PlanningContext) -> Utterance:

@@ -28,6 +28,7 @@ class Recording:
     phonemes: tuple[Phoneme, ...] = ()
     # the phonemes that were recognised in the sound when it arrived, or None
     heard: tuple[Phoneme, ...] | None = None
+    warnings: tuple[str, ...] = ()  # sentences about the sound itself
 
 
 @dataclass(frozen=True, slots=True)

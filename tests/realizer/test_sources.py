@@ -138,3 +138,11 @@ def test_documents_of_a_sound_file_play_it(tmp_path: Path) -> None:
     assert isinstance(block, Block)
     (speech,) = block.behaviours
     assert 'fileName="a talk &amp; more.wav"' in speech.descriptions[0].content
+
+
+def test_documents_of_a_sound_file_with_another_suffix(tmp_path: Path) -> None:
+    for name in ("talk.m4a", "talk.txt", "talk.dat", "talk"):
+        (tmp_path / name).write_bytes(b"\0\0\0\x1cftypM4A and more")
+        (document,) = documents_of(tmp_path / name)
+        (speech,) = parse(document.bml).behaviours
+        assert f'fileName="{name}"' in speech.descriptions[0].content

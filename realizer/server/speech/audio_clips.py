@@ -202,7 +202,7 @@ class AudioClips:
                 from realizer.behaviours.sound_file import read_sound  # most clips are PCM
 
                 sound = read_sound(content)
-                clip.sound = sound.rate, sound.pcm
+                clip.sound, clip.warnings = (sound.rate, sound.pcm), sound.warnings
         except RealizerError as error:
             del self._clips[id]
             raise ClipError(f"clip:{id}", str(error)) from None
@@ -220,7 +220,7 @@ class AudioClips:
         if text is None and words:
             text = " ".join(word.text for word in words)
         heard = None if clip.recogniser is None else tuple(clip.heard)
-        self.recordings[id] = Recording(rate, pcm, text, words, phonemes, heard)
+        self.recordings[id] = Recording(rate, pcm, text, words, phonemes, heard, clip.warnings)
 
     def _make_room(self, newest: str) -> None:
         """Remove the oldest clips if there are too many. Blocks that play have their own reference."""

@@ -39,6 +39,7 @@ class Clip:
     is_annotated: bool = True  # whether the annotation is complete
     recogniser: VisemeRecogniser | None = None
     heard: list[Phoneme] = field(default_factory=list)
+    warnings: tuple[str, ...] = ()  # about the sound
 
     @property
     def size(self) -> int:

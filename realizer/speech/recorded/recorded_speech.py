@@ -106,7 +106,7 @@ def _checked(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     phonemes, more = _usable(SOUNDS, recording.phonemes, duration)
     if (words, phonemes) != (recording.words, recording.phonemes):
         recording = replace(recording, words=words, phonemes=phonemes)
-    return recording, (*wrong, *more)
+    return recording, (*recording.warnings, *wrong, *more)
 
 
 def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple[Timed, ...], list[str]]:

@@ -66,7 +66,7 @@ def test_audio_file_that_cannot_be_read_is_dropped(play, media: Path) -> None:
     (media / "not.wav").write_bytes(b"ID3 this is an mp3")
     played = play('<bmlt:audiofile id="a" fileName="not.wav"/><head id="h" lexeme="NOD"/>', media=media)
     assert played.warnings == [("b:a", "CANNOT_CREATE_BEHAVIOR")]
-    assert "'not.wav': wanted a WAV file" in played.warnings_text
+    assert "'not.wav': wanted a mp3 file" in played.warnings_text
     assert played.times("h")
 
 

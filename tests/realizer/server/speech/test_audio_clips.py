@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import io
 import json
+import struct
 import wave
 
 import numpy as np
@@ -58,6 +59,16 @@ def test_add_chunk_joins_pieces_of_a_file() -> None:
     known.add_chunk(ClipPiece("c", 1, 0, content[777:]))
     assert known.recordings["c"].rate == RATE
     assert np.array_equal(known.recordings["c"].pcm, SOUND)
+
+
+def test_add_chunk_keeps_the_warnings_about_a_file() -> None:
+    known = AudioClips()
+    form = struct.pack("<HHIIHH", 3, 1, RATE, 4 * RATE, 4, 32)
+    data = (SOUND / np.float32(3000)).astype("<f4").tobytes()
+    chunks = b"fmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", len(data)) + data
+    known.add_chunk(ClipPiece("c", 0, 0, b"RIFF\0\0\0\0WAVE" + chunks))
+    (text,) = known.recordings["c"].warnings
+    assert "wanted samples of -1..1" in text
 
 
 def test_add_chunk_recognises_mouth_shapes_as_they_arrive() -> None:
