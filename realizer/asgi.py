@@ -7,7 +7,7 @@ from realizer.core.threads import use_one_thread
 
 use_one_thread()
 try:
-    from realizer.server.asgi.app import create_app
+    from realizer.server.http.app import create_app
 except ImportError as error:
     if error.name is None or error.name.partition(".")[0] != "starlette":
         raise

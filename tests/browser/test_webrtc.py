@@ -26,7 +26,7 @@ from playwright.sync_api import sync_playwright
 
 from realizer.client import connect
 from realizer.protocol.wire import PictureFrame
-from realizer.server.asgi.webrtc import QUALITY
+from realizer.server.http.webrtc import QUALITY
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark
 
 __all__ = ["browser", "pytestmark"]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.asgi.openapi import description
-from realizer.server.asgi.renderings import OPTIONS
+from realizer.server.http.openapi import description
+from realizer.server.http.renderings import OPTIONS
 
 
 def test_description_names_every_format_and_option() -> None:

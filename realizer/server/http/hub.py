@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 from starlette.requests import HTTPConnection, Request
 
 from realizer.core.settings import Settings, SettingsError, limit_hint
-from realizer.server.asgi.renderings import Renderings
 from realizer.server.http.access import ANY_GRANT, AccessControl, Grant
+from realizer.server.http.connections import WebSocketConnections
+from realizer.server.http.renderings import Renderings
 from realizer.server.http.requests import HttpRequests
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.server.transports.transport import Outbound
-from realizer.server.transports.websocket.connection import WebSocketConnections
 
 if TYPE_CHECKING:
-    from realizer.server.asgi.webrtc import Peers
+    from realizer.server.http.webrtc import Peers
 
 
 class Hub:
@@ -85,7 +85,7 @@ class Hub:
             JoinError: 503, the extra is missing.
         """
         try:
-            from realizer.server.asgi.webrtc import Peers
+            from realizer.server.http.webrtc import Peers
         except ImportError as error:
             if error.name is None or error.name.partition(".")[0] not in ("aiortc", "av"):
                 raise

@@ -4,7 +4,7 @@ from typing import Any
 
 import realizer
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.asgi.renderings import OPTIONS
+from realizer.server.http.renderings import OPTIONS
 
 TEXT = {"application/xml": {"schema": {"type": "string"}}, "text/plain": {"schema": {"type": "string"}}}
 BODY = {"required": True, "description": "BML, or a text to speak", "content": TEXT}

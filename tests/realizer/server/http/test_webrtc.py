@@ -16,11 +16,11 @@ from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from realizer.client import connect
 from realizer.core.settings import Settings
-from realizer.server.asgi import webrtc
-from realizer.server.asgi.app import create_app
-from realizer.server.asgi.webrtc import offer_of, video_fields
+from realizer.server.http import webrtc
+from realizer.server.http.app import create_app
+from realizer.server.http.webrtc import offer_of, video_fields
 from realizer.server.runtime.session_registry import JoinError
-from tests.realizer.server.asgi.conftest import LIMIT, Served
+from tests.realizer.server.http.conftest import LIMIT, Served
 
 RATE = 16000
 

@@ -16,7 +16,7 @@ pytest.importorskip("aiortc", reason="needs the webrtc extra")
 from aiortc.mediastreams import MediaStreamError
 
 from realizer.protocol.wire import pack, unpack
-from realizer.server.asgi.tracks import (
+from realizer.server.http.tracks import (
     FIRST,
     LOST,
     MOST,

@@ -13,8 +13,8 @@ from typing import Any
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from realizer.protocol.wire import unpack
-from realizer.server.asgi.openapi import VIDEO
-from realizer.server.asgi.tracks import RATE, PictureTrack, Playout, SoundTrack
+from realizer.server.http.openapi import VIDEO
+from realizer.server.http.tracks import RATE, PictureTrack, Playout, SoundTrack
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 

@@ -16,9 +16,9 @@ from websockets.sync.client import connect
 pytest.importorskip("starlette", reason="needs the asgi extra")
 
 from realizer.core.settings import Settings
-from realizer.server.asgi.app import create_app, event_of
 from realizer.server.http.access import LEEWAY
-from tests.realizer.server.asgi.conftest import LIMIT, Served
+from realizer.server.http.app import create_app, event_of
+from tests.realizer.server.http.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
 

@@ -12,8 +12,8 @@ from websockets.sync.client import connect
 pytest.importorskip("starlette", reason="needs the asgi extra")
 
 from realizer.core.settings import Settings, SettingsError
-from realizer.server.asgi.app import create_app
-from tests.realizer.server.asgi.conftest import LIMIT, Served
+from realizer.server.http.app import create_app
+from tests.realizer.server.http.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
 

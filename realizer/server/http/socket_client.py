@@ -10,7 +10,7 @@ from realizer.core.settings import Settings, limit_hint
 from realizer.server.transports.websocket.protocol import GOODBYE, REASON, UNIT, RateLimiter
 
 
-class AsgiClient:
+class SocketClient:
     """A `ClientSocket` of an ASGI server: data waits in a queue that a task sends.
 
     The rate of messages and bytes is limited as by `protocol.Connection`; control frames are the server's.

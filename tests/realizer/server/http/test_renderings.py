@@ -10,7 +10,7 @@ from http import HTTPStatus
 import pytest
 
 from realizer.core.settings import Settings
-from realizer.server.asgi.renderings import MOST_WAITING, Renderings, fault_of
+from realizer.server.http.renderings import MOST_WAITING, Renderings, fault_of
 from realizer.server.runtime.session_registry import JoinError
 
 NOD = b'<bml id="a"><head id="n" lexeme="NOD"/></bml>'

@@ -21,12 +21,12 @@ from starlette.websockets import WebSocket
 
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.asgi.client import AsgiClient
-from realizer.server.asgi.hub import Hub, address_of
-from realizer.server.asgi.openapi import FINDING, description
 from realizer.server.http.http_site import FRAMES
+from realizer.server.http.hub import Hub, address_of
+from realizer.server.http.openapi import FINDING, description
 from realizer.server.http.page_tools import MAX_TEXT
 from realizer.server.http.requests import SOCKETS, session_of
+from realizer.server.http.socket_client import SocketClient
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.sources import document_of
 
@@ -105,7 +105,7 @@ async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
         )
         return
     await socket.accept()
-    client = AsgiClient(socket, target, address, hub.settings)
+    client = SocketClient(socket, target, address, hub.settings)
     try:
         await hub.connections.serve(client)
         await client.close(1000, "")
@@ -200,7 +200,7 @@ async def _end(hub: Hub, request: Request) -> Response:
 async def _connect_peer(hub: Hub, request: Request) -> Response:
     """Answer the SDP offer in the body: a peer gets the picture and the sound of a session by WebRTC."""
     peers = hub.open_peers()
-    from realizer.server.asgi.webrtc import Peer, offer_of
+    from realizer.server.http.webrtc import Peer, offer_of
 
     grant, name = hub.grant(request), request.path_params["session"]
     visitor = Visitor(address_of(request), grant.sessions)

@@ -14,8 +14,8 @@ from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 
 from realizer.core.settings import Settings
-from realizer.server.asgi.client import AsgiClient
-from tests.realizer.server.asgi.conftest import LIMIT
+from realizer.server.http.socket_client import SocketClient
+from tests.realizer.server.http.conftest import LIMIT
 
 
 def talk(serve, act, settings=None):
@@ -24,7 +24,7 @@ def talk(serve, act, settings=None):
 
     async def endpoint(socket) -> None:
         await socket.accept()
-        client = AsgiClient(socket, "/ws", "here", settings or Settings())
+        client = SocketClient(socket, "/ws", "here", settings or Settings())
         results.append(await act(client))
         await client.close(1000, "")
         await client.finish()

@@ -67,9 +67,9 @@ def test_connection_logs_its_begin_and_end(caplog: pytest.LogCaptureFixture) -> 
             await client.recv()
             await client.close()
 
-    with caplog.at_level(logging.INFO, "realizer.server.transports.websocket.connection"):
+    with caplog.at_level(logging.INFO, "realizer.server.http.connections"):
         asyncio.run(run())
-    joined, left = (r for r in caplog.records if r.name == "realizer.server.transports.websocket.connection")
+    joined, left = (r for r in caplog.records if r.name == "realizer.server.http.connections")
     assert (joined.message, left.message) == ("joined", "left")
     assert (joined.session, joined.address) == ("show", "127.0.0.1")  # type: ignore[attr-defined]
     assert (left.session, left.code) == ("show", 1000)  # type: ignore[attr-defined]

@@ -1,1 +1,0 @@
-"""The service as an ASGI application, under uvicorn or inside another application."""
