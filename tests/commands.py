@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import click
 from click.testing import CliRunner
 
 from realizer.cli import main
@@ -28,3 +29,10 @@ def run(*arguments: str, stdin: str | bytes = "") -> Finished:
             status = end.code
     assert isinstance(status, int)
     return Finished(status, stdout.getvalue().decode(), stderr.getvalue().decode())
+
+
+def members(group: click.Group) -> dict[str, click.Command]:
+    """Return the commands of a group by name."""
+    context = click.Context(group)
+    found = {name: group.get_command(context, name) for name in group.list_commands(context)}
+    return {name: command for name, command in found.items() if command is not None}

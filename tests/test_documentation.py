@@ -68,7 +68,7 @@ def test_code_of_a_page_runs(
 def commands(page: Path) -> Iterator[list[str]]:
     """Yield the words of each call of the command line on a page, also within a sentence."""
     text = page.read_text("utf-8")
-    known = "|".join(cli.commands)
+    known = "|".join(cli.list_commands(click.Context(cli)))
     for words in re.findall(rf"(?<!`)`(?:realizer )?((?:{known}) --[^`\n]+)`", text):
         yield words.split()
     for block in blocks(page, "sh"):
@@ -91,9 +91,10 @@ def unknown_words(words: list[str]) -> list[str]:
     """Return the commands and options of a call that do not exist."""
     command: click.Command = cli
     while isinstance(command, click.Group) and words and not words[0].startswith("-"):
-        if words[0] not in command.commands:
+        found = command.get_command(click.Context(command), words[0])
+        if found is None:
             return [words[0]]
-        command, words = command.commands[words[0]], words[1:]
+        command, words = found, words[1:]
     known = {
         option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)
     }

@@ -157,17 +157,6 @@ def test_imports_have_no_circle() -> None:
         pytest.fail("circle of imports: " + " -> ".join(reversed(error.args[1])))
 
 
-def test_what_runs_names_tools_that_make_faces_in_one_place() -> None:
-    """An import by a name in a string would pass the other tests."""
-    users = [
-        name
-        for name, path in modules()
-        if LEVELS.get(package_of(name) or "", 0) < LEVELS["realizer.facebuild"]
-        and "realizer.facebuild." in path.read_text("utf-8")
-    ]
-    assert users == ["realizer.face.load"]
-
-
 def test_the_command_line_starts_without_the_heavy_libraries() -> None:
     code = "import sys, realizer, realizer.cli; print(*sys.modules)"
     loaded = subprocess.run(

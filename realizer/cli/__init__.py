@@ -3,28 +3,23 @@
 import errno
 import sys
 from collections.abc import Sequence
-from importlib import import_module
 from typing import NoReturn
 
 import click
 
 import realizer
 from realizer.cli import progress
+from realizer.cli.command_group import CommandGroup
 from realizer.cli.options import option
 from realizer.core.errors import RealizerError, TableError, UnknownNameError
 from realizer.core.threads import use_one_thread
 
 __all__ = ["main"]
 
-COMMANDS = """
-    align batch check corpus demo doctor emotion enrich explain expressions faces fap outputs plugins realize
-    replay schedule serve study timeline track voices
-"""
-# Commands that are not in the module of their name.
-MODULES = {"outputs": "doctor", "plugins": "doctor", "schedule": "realize", "voices": "doctor"}
 
-
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.group(
+    cls=CommandGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
+)
 @click.version_option(realizer.__version__, prog_name="realizer")
 @option("-v --verbose", progress.VERBOSE, is_flag=True)
 @option("-q --quiet", progress.QUIET, is_flag=True)
@@ -54,12 +49,6 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
     """
     use_one_thread()
     progress.configure_logging(context, quiet=quiet, verbose=verbose)
-
-
-for name in COMMANDS.split():
-    command: click.Command = getattr(import_module(f"realizer.cli.{MODULES.get(name, name)}"), name)
-    progress.verbosity(command)
-    cli.add_command(command)
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:

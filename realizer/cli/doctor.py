@@ -15,6 +15,7 @@ import click
 import realizer
 from realizer.cli import options
 from realizer.cli.progress import note
+from realizer.core.errors import FaceError
 
 Finding = tuple[bool, str, str]  # whether it works, its name, a description or the fix
 PACKAGES = ("numpy", "scipy", "numba", "moderngl", "av", "espeakng-loader", "hibari-tts", "pocketsphinx")
@@ -53,8 +54,7 @@ def _versions() -> dict[str, str | None]:
 
 def _parts() -> Iterator[Finding]:
     """Yield what works, or how to fix it, as soon as it is known."""
-    from realizer.face.load import list_faces
-    from realizer.facebuild.check import check_face
+    from realizer.face.load import list_faces, load_face
     from realizer.render.drawing_process import available_backend
     from realizer.speech.registry import voices
 
@@ -72,8 +72,11 @@ def _parts() -> Iterator[Finding]:
     if not faces:
         yield False, "faces", "no face folder was found; reinstall bml-realizer"
     for face in faces:
-        faults = check_face(face.name)
-        yield not faults, "face", f"{face.name}: {faults[0] if faults else face.description}"
+        try:
+            load_face(face.name)
+            yield True, "face", f"{face.name}: {face.description}"
+        except FaceError as error:
+            yield False, "face", f"{face.name}: {error}"
     works = files("realizer.server").joinpath("static", "index.html").is_file()
     fix = "the page is not built; install from a wheel, or have npm and run pip install -e ."
     yield works, "page", "served at http://HOST:PORT/" if works else fix
@@ -108,17 +111,21 @@ def outputs() -> None:
 @click.command()
 @options.as_json
 def plugins(as_json: bool) -> None:
-    """List the behaviours, outputs, voices, transports and faces of other packages.
+    """List what other packages add: behaviours, outputs, voices, transports, faces, commands, editors.
 
     Prints group, name, package and object of each, and why it cannot be used if so.
     """
     from realizer.behaviours.registry import FAMILIES
-    from realizer.face.load import FACES
+    from realizer.cli.command_group import COMMANDS
+    from realizer.face.load import BUILDERS, FACES
     from realizer.outputs.registry import OUTPUTS
+    from realizer.server.editors import EDITORS
+    from realizer.server.session.tracked_faces import TRACKERS
     from realizer.server.transports.transport import TRANSPORTS
     from realizer.speech.registry import VOICES
 
-    found = [p for registry in (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES) for p in registry.plugins()]
+    groups = (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES, BUILDERS, COMMANDS, EDITORS, TRACKERS)
+    found = [plugin for registry in groups for plugin in registry.plugins()]
     if as_json:
         click.echo(json.dumps([asdict(plugin) for plugin in found], indent=1))
         return

@@ -16,6 +16,7 @@ from realizer.core.errors import PluginError
 
 T = TypeVar("T")
 
+DISTRIBUTION = "bml-realizer"
 # Longer values are not written out in warnings.
 LONGEST = 60
 
@@ -94,9 +95,11 @@ class Registry(Mapping[str, T], Generic[T]):
                 self._warn(str(error))
 
     def plugins(self) -> list[Plugin]:
-        """Return the plug-ins of this group, imported to see whether they can be used."""
+        """Return the plug-ins of other packages in this group, imported to see whether they can be used."""
         found = []
         for point in sorted(_installed().select(group=self.group), key=lambda point: point.name):
+            if _is_own(point):
+                continue
             fault = "" if self._plugins.get(point.name) is point else "its name is taken"
             try:
                 if not fault:
@@ -110,7 +113,7 @@ class Registry(Mapping[str, T], Generic[T]):
     @cached_property
     def _plugins(self) -> dict[str, EntryPoint]:
         found: dict[str, EntryPoint] = {}
-        for point in _installed().select(group=self.group):
+        for point in sorted(_installed().select(group=self.group), key=_is_own, reverse=True):
             if point.name in self._ours or point.name in found:
                 self._warn(f"{_described(point)} is not used: its name is taken")
             else:
@@ -127,9 +130,15 @@ class Registry(Mapping[str, T], Generic[T]):
             ours: T = getattr(import_module(module), attribute)
             return ours
         point = self._plugins[name]
+        package = point.module.partition(".")[0]
         try:
             loaded: T = point.load()
         except Exception as error:
+            if isinstance(error, ModuleNotFoundError) and error.name == package:
+                again = f": pip install --force-reinstall {point.dist.name}" if point.dist else ""
+                what = repr(name) if _is_own(point) else _described(point)
+                words = f"{what} needs the package {package}, which is not installed{again}"
+                raise PluginError(words) from None
             reason = f"{type(error).__name__}: {error}"
             raise PluginError(f"{_described(point)} cannot be imported: {reason}") from error
         if not self._accepts(loaded):
@@ -138,6 +147,11 @@ class Registry(Mapping[str, T], Generic[T]):
         if self._name_of is not None and (wanted := self._name_of(loaded)) != name:
             raise PluginError(f"{_described(point)} cannot be used: wanted the name {wanted!r}")
         return loaded
+
+
+def _is_own(point: EntryPoint) -> bool:
+    """Return whether an entry point is one of this distribution, which no other package can replace."""
+    return point.dist is not None and point.dist.name == DISTRIBUTION
 
 
 def _shortened(value: object) -> str:

@@ -7,10 +7,9 @@ import errno
 import hashlib
 import logging
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -41,13 +40,15 @@ FACES: Registry[Path | str] = Registry(
     wanted="a folder of face folders as a Path or a string",
     accepts=lambda value: isinstance(value, (Path, str)),
 )
-HEADS = (".glb",)  # suffixes of heads that are imported on first use
+# What makes a face folder of a head, by the suffix of the head's file, such as ".glb". Heads are imported on
+# first use.
+BUILDERS: Registry[Callable[[Path, Path], object]] = Registry(
+    "realizer.face_builders",
+    {},
+    wanted="a function that takes the file of a head and the folder to write",
+    accepts=callable,
+)
 IMPORT = b"1"  # changed when heads come out of the import differently, so that they are imported again
-# Tools of `realizer.facebuild` -> their modules. What runs imports them only here, by name, on first use.
-FACE_TOOLS = {
-    "import_head": "realizer.facebuild.arkit.importer",
-    "Studio": "realizer.facebuild.studio.studio",
-}
 DEFAULT = "ada"  # the face that the name "default" stands for
 VARIABLE = "REALIZER_FACES"
 DEFORMER = "REALIZER_DEFORMER"
@@ -59,11 +60,6 @@ MESH = {"vertices": 2, "triangles": 2, "colours": 2, "occlusion": 1, "gloss": 1}
 log = logging.getLogger(__name__)
 
 
-def face_tool(name: str) -> Any:
-    """Return a tool of FACE_TOOLS, loaded on first use."""
-    return getattr(import_module(FACE_TOOLS[name]), name)
-
-
 def face_name(name: str) -> str:
     """Return the folder name of a face name; "default" is a valid name. A path stays as it is."""
     return DEFAULT if name == "default" else name
@@ -71,7 +67,7 @@ def face_name(name: str) -> str:
 
 def is_path(name: str | Path) -> bool:
     """Return whether a face is given as a path, of a face folder or of a GLB head, and not as a name."""
-    if isinstance(name, Path) or Path(name).suffix.lower() in HEADS:
+    if isinstance(name, Path) or Path(name).suffix.lower() in BUILDERS:
         return True
     return os.sep in name or (os.altsep or os.sep) in name
 
@@ -102,6 +98,7 @@ def load_face(
 
     Raises:
         FaceError: an unusable folder or head; the text says which file and what to change.
+        PluginError: what imports heads is not installed.
         UnknownFaceError: no face of that name. FileNotFoundError: nothing at that path.
     """
     folder, chosen = folder_of(name, directory), _deformer_override(deformer)
@@ -174,8 +171,11 @@ def folder_of(name: str | Path, directory: Path | str | None = None) -> Path:
 @lru_cache(maxsize=16)
 def _imported(head: Path) -> Path:
     """Return the face folder of a GLB head, importing it if that was not done before."""
-    if head.suffix.lower() not in HEADS:
-        raise FaceError(f"{head}: wanted a face folder, or a head as GLB")
+    suffix = head.suffix.lower()
+    if suffix not in BUILDERS:
+        known = f", or a head as {' or '.join(BUILDERS)}" if BUILDERS else ""
+        raise FaceError(f"{head}: wanted a face folder{known}")
+    build = BUILDERS[suffix]
     digest = hashlib.sha256(IMPORT + head.read_bytes()).hexdigest()[:16]
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "realizer" / "faces" / digest / head.stem
@@ -184,7 +184,7 @@ def _imported(head: Path) -> Path:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(dir=folder.parent) as place:
             draft = Path(place) / head.stem
-            face_tool("import_head")(head, draft)
+            build(head, draft)
             with contextlib.suppress(OSError):  # another process has imported it meanwhile
                 draft.rename(folder)
     return folder

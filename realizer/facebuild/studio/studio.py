@@ -13,6 +13,7 @@ import numpy as np
 
 from realizer.core.atomic_files import lock
 from realizer.core.errors import FaceError, RealizerError
+from realizer.core.settings import Settings
 from realizer.face.basis import FAPS
 from realizer.face.deform import deform
 from realizer.face.features import read_features, write_features
@@ -39,11 +40,12 @@ class Studio:
     """The Face tab of one page: the head that it edits, in a folder of its own, and the faces made of it.
 
     Args:
-        edit: the folder of the setting `edit`: faces are saved in its folder `faces`; None: nothing is saved.
+        settings: of the service; faces are saved in the folder `faces` of its setting `edit`.
+        may_save: whether this page may save faces.
     """
 
-    def __init__(self, edit: Path | None = None) -> None:
-        self._edit = None if edit is None else edit / FACES
+    def __init__(self, settings: Settings, may_save: bool) -> None:
+        self._edit = settings.edit / FACES if may_save and settings.edit is not None else None
         self._place = TemporaryDirectory(prefix="realizer-face-")
         self._head: Path | None = None
         self._count = 0

@@ -6,7 +6,9 @@ import json
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import asdict, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError, TableError
@@ -15,30 +17,51 @@ from realizer.expressions.expression import Expression
 from realizer.expressions.library import library_of
 from realizer.expressions.timeline import Timeline, faults_of
 from realizer.expressions.timeline_file import MAX_SECONDS, read_timeline
+from realizer.face.load import face_folders, face_name
 
 if TYPE_CHECKING:
     from realizer.tables.knowledge import Mood, Role
 
 MAX_REQUEST = 1_000_000  # characters
 
+_drawing = ThreadPoolExecutor(1, "pictures")
 
-def answer(text: str, settings: Settings) -> str:
-    """Return the answer to a request as JSON; {"error": text} if there is none.
+
+class Designer:
+    """The tab Design of one page.
 
     Args:
-        text: {"tool": a key of `TOOLS`, ...}.
+        settings: of the service.
+        may_save: whether this page may save; the tab itself saves by messages of its session.
     """
-    try:
-        if len(text) > MAX_REQUEST:
-            raise RealizerError(f"wanted at most {MAX_REQUEST} characters, got {len(text)}")
-        request = json.loads(text)
-        tool = TOOLS.get(request.get("tool")) if isinstance(request, dict) else None
-        if tool is None:
-            raise RealizerError(f"tool: wanted one of {', '.join(TOOLS)}")
-        return json.dumps(tool(request, settings), ensure_ascii=False, separators=(",", ":"))
-    except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
-        words = error.args[0] if isinstance(error, KeyError) and error.args else error
-        return json.dumps({"error": str(words)})
+
+    def __init__(self, settings: Settings, may_save: bool) -> None:
+        self._settings = settings
+
+    def answer(self, message: str | bytes) -> str:
+        """Return the answer to a request as JSON; {"id", "error": text} if there is none.
+
+        Args:
+            message: {"id": number, "tool": a key of `TOOLS`, ...}.
+        """
+        number = None
+        try:
+            if len(message) > MAX_REQUEST:
+                raise RealizerError(f"wanted at most {MAX_REQUEST} characters, got {len(message)}")
+            request = json.loads(message)
+            if not isinstance(request, dict):
+                raise RealizerError("wanted a JSON object")
+            number = request.get("id")
+            if (tool := TOOLS.get(request.get("tool"))) is None:
+                raise RealizerError(f"tool: wanted one of {', '.join(TOOLS)}")
+            found = {"id": number, **tool(request, self._settings)}
+            return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
+        except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
+            words = error.args[0] if isinstance(error, KeyError) and error.args else error
+            return json.dumps({"id": number, "error": str(words)})
+
+    def close(self) -> None:
+        """Nothing is held."""
 
 
 def timeline_of(request: Mapping[str, Any], settings: Settings) -> Timeline:
@@ -179,6 +202,23 @@ def _says(request: Mapping[str, Any]) -> list[tuple[float, str]]:
     return says
 
 
+def _pictures(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
+    """Return pictures of all expressions as a WebP in base64; {"drawing": true} while they are drawn."""
+    face = str(request.get("face") or settings.face)
+    if face_name(face) not in face_folders():
+        raise ValueError(f"face: wanted one of {', '.join(face_folders())}, got {face[:80]!r}")
+    drawn = _sheet(face, settings, library_of(settings.library_folder).edition)
+    return {"picture": b64encode(drawn.result()).decode()} if drawn.done() else {"drawing": True}
+
+
+@lru_cache(8)
+def _sheet(face: str, settings: Settings, edition: int) -> Future[bytes]:
+    """Begin to draw the expressions of an edition of the library, which takes seconds."""
+    from realizer.server.design.frames import sheet
+
+    return _drawing.submit(sheet, face, settings)
+
+
 TOOLS: Mapping[Any, Callable[[Mapping[str, Any], Settings], dict[str, Any]]] = {
     "library": _library,
     "check": _check,
@@ -187,4 +227,5 @@ TOOLS: Mapping[Any, Callable[[Mapping[str, Any], Settings], dict[str, Any]]] = {
     "enrich": _enrich,
     "export": _export,
     "sound": _sound,
+    "pictures": _pictures,
 }

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.errors import RealizerError
+from realizer.core.settings import Settings
 from realizer.corpus.agreement import agreement
 from realizer.corpus.films import films
 from realizer.corpus.recording import (
@@ -37,12 +38,12 @@ class Labelling:
     """The tab Label of one page.
 
     Args:
-        folder: the corpus; None: there is none.
+        settings: of the service; its corpus is that of the tab.
         may_save: whether this page may change labels.
     """
 
-    def __init__(self, folder: Path | None, *, may_save: bool) -> None:
-        self._folder, self._may_save = folder, may_save
+    def __init__(self, settings: Settings, may_save: bool) -> None:
+        self._folder, self._may_save = settings.corpus, may_save
 
     def answer(self, message: str | bytes) -> str | bytes:
         """Return the answer to a message: JSON with `id` and `type`.

@@ -5,10 +5,12 @@ import contextlib
 import http
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
+from functools import partial
 from typing import Protocol
 
 from realizer.core.settings import Settings, limit_hint
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
+from realizer.server.editors import EDITORS, editor_of
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, Grant
 from realizer.server.http.requests import path_of, session_of
@@ -56,10 +58,9 @@ class WebSocketConnections:
         self._access = access
         self._work: dict[str, Callable[[ClientSocket], Awaitable[None]]] = {
             "/check": self._check,
-            "/studio": self._edit,
-            "/label": self._edit,
+            **{f"/{name}": partial(self._edit, name, asyncio.Lock()) for name in EDITORS},
         }
-        self._checking, self._editing = asyncio.Lock(), asyncio.Lock()
+        self._checking = asyncio.Lock()
         self._from: list[str] = []  # the addresses of the open connections
 
     def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
@@ -175,8 +176,7 @@ class WebSocketConnections:
         await client.close(1013 if code is None else 1008, str(error))
 
     async def _check(self, client: ClientSocket) -> None:
-        """Serve the WebSocket of an editor: answer each text that arrives, BML by its faults."""
-        from realizer.server.design.requests import answer
+        """Serve the WebSocket of a text: answer each version that arrives by its faults."""
         from realizer.server.http.page_tools import lint
 
         loop = asyncio.get_running_loop()
@@ -184,28 +184,22 @@ class WebSocketConnections:
             if isinstance(text, bytes):
                 await client.close(1003, "wanted text")
                 return
-            # One text at a time for all editors: sessions come first.
+            # One text at a time for all pages: sessions come first.
             async with self._checking:
-                tool = answer if text.startswith("{") else lint
-                found = await loop.run_in_executor(None, tool, text, self._settings)
+                found = await loop.run_in_executor(None, lint, text, self._settings)
             await client.send_all(found)
 
-    async def _edit(self, client: ClientSocket) -> None:
-        """Serve the WebSocket of a page that edits a face or labels: answer its messages in their order."""
-        from realizer.face.load import face_tool
-        from realizer.server.edits.labelling import Labelling
-
+    async def _edit(self, name: str, turn: asyncio.Lock, client: ClientSocket) -> None:
+        """Serve the WebSocket of an editor: answer the messages of a page in their order."""
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
-        if path_of(client.target) == "/label":
-            tool = Labelling(self._settings.corpus, may_save=may_save)
-        else:
-            tool = face_tool("Studio")(self._settings.edit if may_save else None)
         loop = asyncio.get_running_loop()
+        make = partial(editor_of, name, self._settings, may_save=may_save)
+        editor = await loop.run_in_executor(None, make)
         try:
             while (message := await client.receive()) is not None:
-                async with self._editing:  # one at a time for all pages, because each may take seconds
-                    answer = await loop.run_in_executor(None, tool.answer, message)
+                async with turn:  # one at a time for all pages, because each may take seconds
+                    answer = await loop.run_in_executor(None, editor.answer, message)
                 await client.send_all(answer)
         finally:
-            await loop.run_in_executor(None, tool.close)
+            await loop.run_in_executor(None, editor.close)

@@ -7,7 +7,6 @@ import logging
 import mimetypes
 import re
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -45,10 +44,7 @@ DOCUMENTATION_POLICY = (
 NO_DOCUMENTATION = """The documentation has not been built.
 Build it in a checkout: pip install -e '.[docs]' && python -m mkdocs build
 """
-PATIENCE = 5.0  # s; how long a request waits for pictures
 NAME = re.compile(r"[a-z0-9_-]{1,64}")  # in a URL
-
-_drawing = ThreadPoolExecutor(1, "pictures")
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,6 @@ class HttpSite:
             "/mirror": lambda asked: HttpResponse(200, BYTES, _mirror(asked.get("light", ""))),
             "/background": self._background,
             "/pose.fap": self._pose,
-            "/expressions.webp": self._expressions,
         }
 
     def is_public(self, path: str) -> bool:
@@ -158,17 +153,6 @@ class HttpSite:
         body = self._documentation.joinpath(name).read_bytes()
         headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", DOCUMENTATION_POLICY))
         return HttpResponse(200, _media_type(name), body, headers)
-
-    def _expressions(self, asked: dict[str, str]) -> HttpResponse:
-        """Return pictures of the library, or 202 while they are drawn, which takes seconds."""
-        from realizer.expressions.library import library_of
-
-        edition = library_of(self._settings.library_folder).edition
-        try:
-            drawn = _sheet(_face(asked.get("face", "default")), self._settings, edition).result(PATIENCE)
-        except TimeoutError:
-            return HttpResponse(202, TEXT, b"the pictures are being drawn: ask again\n")
-        return HttpResponse(200, "image/webp", drawn, (("Cache-Control", "no-cache"),))
 
     def _file(self, name: str) -> HttpResponse:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
@@ -263,13 +247,6 @@ def _mirror(light: str) -> bytes:
         raise UnknownName(f"light: wanted one of {', '.join(presets())}, got {light[:80]!r}")
     levels = mirrored_of(preset(light))
     return np.insert(levels, 3, 1, axis=3).astype("<f2").tobytes()
-
-
-@functools.lru_cache(8)
-def _sheet(face: str, settings: Settings, edition: int) -> Future[bytes]:
-    from realizer.server.design.frames import sheet
-
-    return _drawing.submit(sheet, face, settings)
 
 
 @functools.lru_cache(8)

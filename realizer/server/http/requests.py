@@ -11,6 +11,7 @@ from websockets.http11 import Request, Response
 
 from realizer.core.settings import Settings
 from realizer.core.similar import did_you_mean, similar
+from realizer.server.editors import EDITORS
 from realizer.server.http.access import AccessControl
 from realizer.server.http.http_site import FRAMES, TEXT, HttpResponse, HttpSite
 from realizer.server.http.metrics import MEDIA_TYPE
@@ -78,7 +79,7 @@ def response_to(answer: HttpResponse, origin: str | None = None) -> Response:
 
 
 PARAMETERS = frozenset({"session", "seen", "token"})  # of a WebSocket's address; others are ignored
-SOCKETS = ("/ws", "/check", "/studio", "/label")  # paths of WebSockets
+SOCKETS = ("/ws", "/check", *(f"/{name}" for name in EDITORS))  # paths of WebSockets
 
 
 class HttpRequests:

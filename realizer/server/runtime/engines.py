@@ -12,13 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError, RenderError, VoiceError
 from realizer.core.work import FairPool
-from realizer.server.session.effects import Draw, Look, RenderOptions, Speak
+from realizer.server.session.effects import Draw, Look, RenderOptions, Sight, Speak
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.utterance import Utterance, Voice
 
 if TYPE_CHECKING:
     from realizer.render.renderer import Renderer
-    from realizer.tracking.mirror import Sight
 
 # Each combination of face, size, camera, light and background has a renderer, which is a process.
 RENDERERS = 6
@@ -81,7 +80,7 @@ class Engines:
     def look(self, order: Look) -> Sight | RealizerError | None:
         """Return what a picture shows, or the error."""
         try:
-            return order.mirror(order.picture, order.time)
+            return order.tracker(order.picture, order.time)
         except RealizerError as error:
             return error
         except Exception as error:

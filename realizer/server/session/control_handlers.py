@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import get_args
 
-from realizer.core.errors import FaceError, VoiceError
+from realizer.core.errors import FaceError, PluginError, VoiceError
 from realizer.playback.player import Player
 from realizer.protocol.messages import requests
 from realizer.protocol.messages.common import Reply
@@ -53,6 +53,8 @@ class ControlHandlers:
             answer = _error("face", error, f"{message.type}.face")
         except VoiceError as error:
             answer = _error("voice", error, f"{message.type}.voice")
+        except PluginError as error:
+            answer = _error("unsupported", error, message.type)
         self.player.drop_characters(characters)
         self.reply(connection.id, answer)
 

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from realizer.core.array_types import Float32
 from realizer.protocol.messages.requests import Save
 from realizer.speech.utterance import SpeechRequest
 
-if TYPE_CHECKING:
-    from realizer.tracking.mirror import Mirror
+
+class Sight(Protocol):
+    """What a picture shows of a face."""
+
+    units: Mapping[str, float]  # action units by name, 0..1, with those of head and eyes
+    head: tuple[float, float, float]  # degrees of pitch, yaw and roll
+    emotion: str | None  # the recognised one, or None
+    certainty: float
+
+
+class Tracker(Protocol):
+    """Measures the face in the pictures of one camera, one after the other."""
+
+    def __call__(self, picture: bytes, time: float, /) -> Sight | None:
+        """Return what a picture at a time in seconds shows, or None; raises RealizerError if it is none."""
 
 
 class Send(NamedTuple):
@@ -80,7 +94,7 @@ class Look:
     """
 
     id: int
-    mirror: Mirror
+    tracker: Tracker
     picture: bytes
     time: float
 

@@ -9,7 +9,7 @@ import json
 import logging
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bml_schema import WarningFeedback
 from realizer.behaviours.kind import Position
@@ -30,16 +30,13 @@ from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Connections, FeedbackLog
 from realizer.server.session.control_handlers import PASSING, ControlHandlers
 from realizer.server.session.due_work import DueWork, SessionClock
-from realizer.server.session.effects import Close, Effect
+from realizer.server.session.effects import Close, Effect, Sight
 from realizer.server.session.query_handlers import QueryHandlers
 from realizer.server.session.subscriptions import Subscriptions
 from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.streams.broadcast import Broadcast
 from realizer.speech.utterance import Utterance
-
-if TYPE_CHECKING:
-    from realizer.tracking.mirror import Sight
 
 log = logging.getLogger(__name__)
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from realizer.core.errors import RealizerError
+from realizer.core.errors import PluginError, RealizerError
+from realizer.core.registry import Registry
 from realizer.playback.player import Player
 from realizer.protocol.messages.replies import ErrorMessage, Tracked
 from realizer.protocol.messages.requests import Track
@@ -15,10 +16,15 @@ from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import HEADER
 from realizer.server.session.connections import Connections
 from realizer.server.session.control_fields import character_index
-from realizer.server.session.effects import Look
+from realizer.server.session.effects import Look, Sight, Tracker
 
-if TYPE_CHECKING:
-    from realizer.tracking.mirror import Mirror, Sight
+# What measures faces in pictures, by name; the first one is used. Each takes nothing and returns a tracker.
+TRACKERS: Registry[Callable[[], Tracker]] = Registry(
+    "realizer.trackers",
+    {},
+    wanted="a function or class without arguments that returns a tracker",
+    accepts=callable,
+)
 
 PICTURE = bytes([STREAMS["video"].kind or 0])  # first byte of a picture
 EARLY = 0.8  # of the time between two pictures; one that comes sooner is left out
@@ -31,7 +37,7 @@ class _Camera:
 
     character: str | None
     fps: float
-    mirror: Mirror
+    tracker: Tracker
     last: tuple[float, int] = (float("-inf"), 0)  # time and number of the picture that was looked at last
     is_busy: bool = False
     waiting: bytes | None = None  # the newest picture while another one is looked at
@@ -57,13 +63,15 @@ class TrackedFaces:
 
         Raises:
             FieldError: the session has too many characters.
+            PluginError: no tracker is installed.
         """
-        from realizer.tracking.mirror import Mirror  # slow to load
-
         self.cameras.pop(connection, None)
         if message.fps:
             character_index(self.player, message.character)
-            self.cameras[connection] = _Camera(message.character, message.fps, Mirror())
+            if not TRACKERS:
+                raise PluginError("no tracker of faces is installed (group realizer.trackers)")
+            make = TRACKERS[next(iter(TRACKERS))]
+            self.cameras[connection] = _Camera(message.character, message.fps, make())
 
     def drop(self, connection: int) -> None:
         """Forget the camera of a connection."""
@@ -82,7 +90,7 @@ class TrackedFaces:
         elif t - camera.last[0] >= EARLY / camera.fps:
             _, _, _, number, _ = HEADER.unpack_from(message)
             camera.last, camera.is_busy, camera.waiting = (t, number), True, None
-            self.connections.add_effects([Look(connection, camera.mirror, message[HEADER.size :], t)])
+            self.connections.add_effects([Look(connection, camera.tracker, message[HEADER.size :], t)])
         return True
 
     def answer(self, connection: int, result: Sight | RealizerError | None, t: float) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.cli import cli
+from realizer.cli.command_group import COMMANDS
 from realizer.cli.demo import _film, _serve
 from realizer.core.errors import RenderError
 from realizer.outputs import registry
@@ -67,4 +67,4 @@ def test_demo_says_what_it_made_and_what_to_try(
     assert lines[1] == "now try:"
     assert len(lines) <= 10
     for line in lines[2:]:
-        assert shlex.split(line)[1] in cli.commands
+        assert shlex.split(line)[1] in COMMANDS

@@ -11,6 +11,7 @@ from click.testing import CliRunner, Result
 
 from realizer.cli import cli
 from realizer.cli.options import parse_size
+from tests.commands import members
 
 CONTEXT, OPTION = click.Context(cli), click.Option(["--size"])
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
@@ -114,7 +115,7 @@ def test_every_option_has_a_long_name() -> None:
             for option in command.params
             if isinstance(option, click.Option) and not any(name.startswith("--") for name in option.opts)
         ]
-        nested = command.commands.items() if isinstance(command, click.Group) else ()
+        nested = members(command).items() if isinstance(command, click.Group) else ()
         return found + [row for name, each in nested for row in nameless(each, f"{path} {name}")]
 
     assert nameless(cli, "realizer") == []

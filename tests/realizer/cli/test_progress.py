@@ -14,6 +14,7 @@ from realizer.server import serve
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.registry import VOICES
 from realizer.speech.silent import SilentVoice
+from tests.commands import members
 from tests.rows import each_row
 
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="0.2" end="0.6"/></bml>'
@@ -25,7 +26,7 @@ def run(*args: str) -> Result:
 
 def leaves(command: click.Command) -> list[click.Command]:
     if isinstance(command, click.Group):
-        return [leaf for member in command.commands.values() for leaf in leaves(member)]
+        return [leaf for member in members(command).values() for leaf in leaves(member)]
     return [command]
 
 

@@ -48,7 +48,7 @@ def test_connect_raises_the_refusal_of_an_address() -> None:
                 f"{url}?session=a&seen=abc",
                 "seen: wanted the number of the last feedback that came, got 'abc'",
             ),
-            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws, /check, /studio, /label"),
+            (url.replace("/ws", "/other"), "wanted a WebSocket at /ws, /check, /design, /label, /studio"),
             (url.replace("ws:", "http:"), "http"),
         ):
             with pytest.raises(ClientError, match=says):

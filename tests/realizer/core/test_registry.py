@@ -73,7 +73,7 @@ def test_registry_refuses_a_plugin_under_another_name_than_its_own(installed):
 @pytest.mark.parametrize(
     ("value", "code", "says"),
     [
-        ("no_such_module:NUMBER", "", "cannot be imported: ModuleNotFoundError: No module named"),
+        ("no_such_module:NUMBER", "", "needs the package no_such_module"),
         (f"{MODULE}:NUMBER", "raise OSError('disk')", "cannot be imported: OSError: disk"),
         (f"{MODULE}:NUMBER", "NUMBER = ", "cannot be imported: SyntaxError"),
         (f"{MODULE}:NAME", "NUMBER = 7", "cannot be imported: AttributeError"),

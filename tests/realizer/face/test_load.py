@@ -94,7 +94,7 @@ def test_load_face_finds_faces_below_the_current_folder(
 
 def test_load_face_refuses_a_file_that_is_no_head(tmp_path: Path) -> None:
     (tmp_path / "x.txt").write_text("x")
-    with pytest.raises(FaceError, match="wanted a face folder, or a head as GLB"):
+    with pytest.raises(FaceError, match=r"wanted a face folder, or a head as \.glb"):
         load_face(tmp_path / "x.txt")
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realizer.core.settings import Settings
 from realizer.face.load import load_folder
 from realizer.facebuild.check import check_face
 from realizer.facebuild.studio import studio as studio_module
@@ -21,7 +22,7 @@ class Asking:
     """A studio that is asked as the page asks it."""
 
     def __init__(self, edit: Path | None) -> None:
-        self.studio = Studio(edit)
+        self.studio = Studio(Settings(edit=edit), True)
 
     def __call__(self, kind: str, payload: bytes = b"", **fields: Any) -> dict[str, Any]:
         text = json.dumps({"type": kind, "id": 7, **fields})

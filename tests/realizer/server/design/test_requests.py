@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import Future
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from realizer.core.settings import Settings
 from realizer.expressions.library import builtin
 from realizer.server.design import requests
-from realizer.server.design.requests import answer
+from realizer.server.design.requests import Designer
 
 TIMELINE = {
     "channel": [
@@ -22,11 +23,13 @@ TIMELINE = {
 
 
 def asked(settings: Settings | None = None, **request: Any) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(answer(json.dumps(request), settings or Settings(voice="silent")))
+    found: dict[str, Any] = json.loads(
+        Designer(settings or Settings(voice="silent"), True).answer(json.dumps(request))
+    )
     return found
 
 
-def test_answer_checks_a_timeline() -> None:
+def test_designer_checks_a_timeline() -> None:
     found = asked(tool="check", timeline=TIMELINE)
     assert found["duration"] == pytest.approx(5 + builtin()["smile"].duration)
     assert found["spans"][0] == [pytest.approx([0.0, 0.3, 2.5, 3.0])]
@@ -39,7 +42,7 @@ def test_answer_checks_a_timeline() -> None:
     assert (companion["track"], companion["expression"]) == (0, "template:surprise")
 
 
-def test_answer_considers_role_and_mood() -> None:
+def test_designer_considers_role_and_mood() -> None:
     smile = {"channel": [{"entries": [{"expression": "template:happiness"}]}]}
     hints = [one["hint"] for one in asked(tool="check", timeline=smile, role="listener")["advice"]]
     assert any("listeners rather show" in hint for hint in hints)
@@ -68,23 +71,23 @@ def test_answer_considers_role_and_mood() -> None:
         ({"tool": "library", "find": "AU99"}, "wanted an action unit"),
     ],
 )
-def test_answer_says_what_is_wrong(request_: dict[str, Any], says: str) -> None:
+def test_designer_says_what_is_wrong(request_: dict[str, Any], says: str) -> None:
     assert says in asked(**request_)["error"]
 
 
 @pytest.mark.parametrize(
     "text", ["{", "[]", "{}", '{"tool": []}', '{"tool": "check", "timeline": ' + "[" * 99_000]
 )
-def test_answer_survives_what_is_no_request(text: str) -> None:
-    assert json.loads(answer(text, Settings()))["error"]
+def test_designer_survives_what_is_no_request(text: str) -> None:
+    assert json.loads(Designer(Settings(), True).answer(text))["error"]
 
 
-def test_answer_refuses_what_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_designer_refuses_what_is_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(requests, "MAX_REQUEST", 10)
     assert "wanted at most 10 characters" in asked(tool="library")["error"]
 
 
-def test_answer_finds_expressions_by_word_and_by_action_units() -> None:
+def test_designer_finds_expressions_by_word_and_by_action_units() -> None:
     assert [row["name"] for row in asked(tool="library")["expressions"]] == list(builtin())
     assert asked(tool="library", find="sorry")["expressions"][0]["name"] == "template:regret"
     assert asked(tool="library", find="AU1+2")["expressions"][0]["units"] == "1+2"
@@ -92,10 +95,21 @@ def test_answer_finds_expressions_by_word_and_by_action_units() -> None:
     assert "cheerfulness" in asked(tool="library")["moods"]
 
 
-def test_answer_names_files_of_expressions_without_their_folder(tmp_path: Path) -> None:
+def test_designer_names_files_of_expressions_without_their_folder(tmp_path: Path) -> None:
     (tmp_path / "expressions").mkdir()
     (tmp_path / "expressions" / "wry.toml").write_text("aus = { 12L = 0.6 }")
     found = asked(Settings(edit=tmp_path), tool="library", find="wry")["expressions"]
     assert (found[0]["file"], found[0]["onset"]) == ("wry", 0.3)
     assert len(found[0]["version"]) == 16
     assert str(tmp_path) not in json.dumps(found)
+
+
+def test_designer_asks_to_wait_while_pictures_of_expressions_are_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    drawn: Future[bytes] = Future()
+    monkeypatch.setattr(requests, "_sheet", lambda face, settings, edition: drawn)
+    assert asked(tool="pictures") == {"id": None, "drawing": True}
+    drawn.set_result(b"RIFF")
+    assert asked(tool="pictures", face="ada", id=3) == {"id": 3, "picture": "UklGRg=="}
+    assert "wanted one of ada" in asked(tool="pictures", face="nobody")["error"]

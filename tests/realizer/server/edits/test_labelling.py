@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realizer.core.settings import Settings
 from realizer.corpus.recording import Annotation, Recording, read_recording, write_recording
 from realizer.server.edits.labelling import Labelling
 
@@ -40,13 +41,13 @@ def saved(corpus: Path) -> list[tuple[str, float, float, str]]:
 def test_labelling_lists_recordings_and_says_which_is_half_written(corpus: Path) -> None:
     (corpus / "ben").mkdir()
     (corpus / "ben" / "labels.csv").write_text("start,end,expression,annotator\n")
-    anna, ben = asked(Labelling(corpus, may_save=True), type="list")["recordings"]
+    anna, ben = asked(Labelling(Settings(corpus=corpus), True), type="list")["recordings"]
     assert anna == {"name": "anna", "annotators": ["eva"], "names": ["smile"]}
     assert ben["error"].startswith("ben: wanted meta.toml, got none")
 
 
 def test_labelling_opens_a_recording_with_its_points(corpus: Path) -> None:
-    found = asked(Labelling(corpus, may_save=True), type="open", recording="anna")
+    found = asked(Labelling(Settings(corpus=corpus), True), type="open", recording="anna")
     assert (found["fps"], found["frames"], found["points"]) == (10, 10, 2)
     assert found["annotators"] == {"eva": [[0.2, 0.6, "smile"]]}
     assert found["data"].reshape(10, 2, 2)[1].tolist() == [[6, 7], [9, 10]]
@@ -54,14 +55,14 @@ def test_labelling_opens_a_recording_with_its_points(corpus: Path) -> None:
 
 def test_labelling_opens_the_film_of_a_recording(corpus: Path) -> None:
     (corpus / "anna" / "film.webm").write_bytes(b"a film")
-    answer = Labelling(corpus, may_save=True).answer('{"type": "open", "recording": "anna"}')
+    answer = Labelling(Settings(corpus=corpus), True).answer('{"type": "open", "recording": "anna"}')
     assert isinstance(answer, bytes)
     assert b'"media": "video/webm"' in answer
     assert answer.rstrip(b"\0").endswith(b"a film")
 
 
 def test_labelling_saves_the_labels_of_one_annotator_only(corpus: Path) -> None:
-    page = Labelling(corpus, may_save=True)
+    page = Labelling(Settings(corpus=corpus), True)
     none = asked(page, type="open", recording="anna")["none"]
     question = {"type": "save", "recording": "anna", "annotator": "tom", "labels": [[0.1, 0.4, "doubt"]]}
     answer = asked(page, **question, version=none)
@@ -71,7 +72,7 @@ def test_labelling_saves_the_labels_of_one_annotator_only(corpus: Path) -> None:
 
 
 def test_labelling_replaces_no_labels_that_somebody_else_saved(corpus: Path) -> None:
-    page = Labelling(corpus, may_save=True)
+    page = Labelling(Settings(corpus=corpus), True)
     question = {"type": "save", "recording": "anna", "annotator": "eva", "labels": []}
     refused = asked(page, **question, version="an old one")
     assert "were changed since you opened them" in refused["error"]
@@ -82,7 +83,7 @@ def test_labelling_replaces_no_labels_that_somebody_else_saved(corpus: Path) -> 
 
 def test_labelling_compares_labels_that_are_not_saved(corpus: Path) -> None:
     question = {"type": "compare", "recording": "anna", "annotator": "tom", "other": "eva"}
-    page = Labelling(corpus, may_save=False)
+    page = Labelling(Settings(corpus=corpus), False)
     assert asked(page, **question, labels=[[0.2, 0.6, "smile"]])["agreement"] == [["all", 1], ["smile", 1]]
     assert asked(page, **question, labels=[])["agreement"] == []
 
@@ -100,20 +101,22 @@ def test_labelling_compares_labels_that_are_not_saved(corpus: Path) -> None:
     ],
 )
 def test_labelling_says_what_a_question_lacks(corpus: Path, question: dict[str, Any], words: str) -> None:
-    page = Labelling(corpus, may_save=True)
+    page = Labelling(Settings(corpus=corpus), True)
     assert words in asked(page, **{"type": "save", "recording": "anna"} | question)["error"]
     assert saved(corpus) == [("eva", 0.2, 0.6, "smile")]
 
 
 def test_labelling_without_a_corpus_or_a_token_says_so(corpus: Path) -> None:
-    assert "--corpus DIR" in asked(Labelling(None, may_save=True), type="list")["error"]
+    assert "--corpus DIR" in asked(Labelling(Settings(corpus=None), True), type="list")["error"]
     question = {"type": "save", "recording": "anna", "annotator": "eva", "labels": []}
-    assert "your token does not allow" in asked(Labelling(corpus, may_save=False), **question)["error"]
+    assert (
+        "your token does not allow" in asked(Labelling(Settings(corpus=corpus), False), **question)["error"]
+    )
 
 
 def test_labelling_keeps_the_labels_when_the_folder_takes_none(corpus: Path) -> None:
     (corpus / "anna" / ".lock").mkdir()  # what refuses root, too
-    page = Labelling(corpus, may_save=True)
+    page = Labelling(Settings(corpus=corpus), True)
     version = asked(page, type="open", recording="anna")["versions"]["eva"]
     question = {"type": "save", "recording": "anna", "annotator": "eva", "labels": [], "version": version}
     assert "labels.csv: cannot be saved" in asked(page, **question)["error"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from concurrent.futures import Future
 from pathlib import Path
 from urllib.parse import quote
 
@@ -15,7 +14,6 @@ from hypothesis import strategies as st
 import realizer
 from realizer.core.settings import Settings
 from realizer.face.load import list_faces
-from realizer.server.http import http_site
 from realizer.server.http.http_site import NAME, NOT_BUILT, HttpSite
 
 SITE = HttpSite(lambda: {"sessions": 2})
@@ -240,14 +238,3 @@ def test_site_lists_its_files_once(tmp_path, monkeypatch) -> None:
     assert site.is_public("/page.js")
     assert not site.is_public("/other.js")
     assert site.answer("/page.js").status == 404
-
-
-def test_site_asks_to_wait_while_pictures_of_expressions_are_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: Future[bytes] = Future()
-    monkeypatch.setattr(http_site, "_sheet", lambda face, settings, edition: drawn)
-    monkeypatch.setattr(http_site, "PATIENCE", 0.0)
-    assert SITE.answer("/expressions.webp").status == 202
-    drawn.set_result(b"RIFF")
-    answer = SITE.answer("/expressions.webp?face=ada")
-    assert (answer.status, answer.media_type, answer.body) == (200, "image/webp", b"RIFF")
-    assert SITE.answer("/expressions.webp?face=nobody").status == 404

@@ -35,7 +35,7 @@ def test_requests_for_a_socket_without_one_say_what_was_wanted() -> None:
     refused = answer("/ws?session=a")
     assert (refused.status, refused.body) == (
         426,
-        b"wanted a WebSocket at /ws, /check, /studio, /label, got plain HTTP at /ws\n",
+        b"wanted a WebSocket at /ws, /check, /design, /label, /studio, got plain HTTP at /ws\n",
     )
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from realizer.core.settings import Settings
 from realizer.face.deform import deform
 from realizer.face.load import load_folder
 from realizer.facebuild.mpeg4.zones import FALLOFFS
@@ -62,7 +63,7 @@ def test_page_moves_vertices_as_the_service_does(bare: Path, tmp_path: Path, fal
         extra = {"ease": 35.0, "smooth_centre": 0.4, "smooth_side": 0.2}
         head["setup"]["zone"] = [{**zone, "falloff": falloff, **extra} for zone in head["setup"]["zone"]]
     page = moved_by_page(packed(head, arrays), tmp_path)
-    studio = Studio()
+    studio = Studio(Settings(), True)
     try:
         studio._head = bare
         face = studio._draft({"setup": head["setup"], "keep": False})

@@ -1,9 +1,9 @@
 // The library of the designer: expressions with pictures, found by word, meaning or action units.
 import { at, make } from "../dom.js";
-import { ask } from "../service.js";
 import { keyOf, titleOf } from "./model.js";
 
 const COLUMNS = 8; // of the sheet of pictures
+const AGAIN = 1000; // ms; pictures that are being drawn are asked for again
 
 export class Strip {
   // ask(request): the service's answer. add(expression, event): use it; the event is where it was dropped.
@@ -21,17 +21,16 @@ export class Strip {
     this.design.rows = new Map(expressions.map((row) => [keyOf(row.name), row]));
     this.design.dispatchEvent(new Event("change"));
     await this.find(at("design-find").value.trim(), expressions);
-    this.draw(face);
+    this.draw(face).catch(() => {});
   }
 
   // Show the pictures of the library; the service may draw them for a while.
   async draw(face) {
     this.face = face;
-    const answer = await ask(`expressions.webp?face=${encodeURIComponent(face)}`);
-    if (face !== this.face || !answer.ok) return;
-    if (answer.status === 202) return this.draw(face);
-    const sheet = URL.createObjectURL(await answer.blob());
-    this.panel.style.setProperty("--sheet", `url("${sheet}")`);
+    const { picture, drawing } = await this.ask({ tool: "pictures", face });
+    if (face !== this.face) return;
+    if (drawing) return setTimeout(() => face === this.face && this.draw(face).catch(() => {}), AGAIN);
+    this.panel.style.setProperty("--sheet", `url("data:image/webp;base64,${picture}")`);
     this.panel.style.setProperty("--rows", Math.ceil(this.order.size / COLUMNS));
     this.pictures = this.order;
     this.panel.classList.add("drawn");

@@ -1,6 +1,6 @@
 // The tab Design: lanes of expressions, edited, checked and shown on the page's face.
-import { Checker } from "../checker.js";
 import { at, choose } from "../dom.js";
+import { StudioService } from "../face/service.js";
 import { download } from "../pose.js";
 import { Expression } from "./expression.js";
 import { Inspector } from "./inspector.js";
@@ -17,7 +17,7 @@ export class DesignTab {
   // link: the connection; stage: the face; sound, recorder: the page's. hear(): switch sound on. film(on): begin or end one.
   constructor(link, stage, { sound, recorder, hear, film }) {
     Object.assign(this, { link, stage, hear, record: film, open: false, marks: new Map() });
-    this.tool = new Checker();
+    this.tool = new StudioService("design");
     this.model = new Design();
     this.voice = new Voice((request) => this.ask(request), sound, recorder);
     this.preview = new Preview((request) => this.ask(request), stage, this.model, this.voice, () => this.showPlaying());
@@ -68,14 +68,11 @@ export class DesignTab {
 
   // The service's answer; what it refuses, and that it cannot be reached, is an error with a sentence.
   async ask(request) {
-    let answer;
     try {
-      answer = await this.tool.send(JSON.stringify(request));
-    } catch {
-      throw Object.assign(new Error(LOST), { lost: true });
+      return await this.tool.ask(request);
+    } catch (error) {
+      throw error.lost ? Object.assign(new Error(LOST), { lost: true }) : error;
     }
-    if (answer.error) throw new Error(answer.error);
-    return answer;
   }
 
   // The tab is shown, or not.

@@ -1,4 +1,4 @@
-// The questions of a tab to the service, over a WebSocket of their own: the Face tab's at studio.
+// The questions of a tab to the service, over a WebSocket of their own: those of the Face tab at studio.
 import { token } from "../service.js";
 
 const AGAIN = 1500; // ms
@@ -27,7 +27,7 @@ export class StudioService extends EventTarget {
       this.socket.onclose = () => {
         this.socket = null;
         resolve(false);
-        for (const { reject } of this.waiting.values()) reject(new Error("The connection was lost. Nothing that you edited is lost; try again when the page is connected."));
+        for (const { reject } of this.waiting.values()) reject(lost("The connection was lost. Nothing that you edited is lost; try again when the page is connected."));
         this.waiting.clear();
         this.dispatchEvent(new Event("lost"));
         setTimeout(() => this.reconnect(), AGAIN);
@@ -52,7 +52,7 @@ export class StudioService extends EventTarget {
   // Resolve to the answer; reject with a sentence.
   async ask(question, bytes) {
     this.connect();
-    if (!(await this.opened)) throw new Error("The service cannot be reached: nothing that you edited is lost.");
+    if (!(await this.opened)) throw lost("The service cannot be reached: nothing that you edited is lost.");
     const answer = await this.send(question, bytes);
     if (answer.type === "head") this.head = [question, bytes];
     return answer;
@@ -65,6 +65,8 @@ export class StudioService extends EventTarget {
     return new Promise((resolve, reject) => this.waiting.set(id, { resolve, reject }));
   }
 }
+
+const lost = (words) => Object.assign(new Error(words), { lost: true });
 
 function joined(text, bytes) {
   const json = new TextEncoder().encode(text);

@@ -1,0 +1,33 @@
+"""Tests of `realizer.server.editors`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from realizer.core.errors import PluginError
+from realizer.core.settings import Settings
+from realizer.server import editors
+from realizer.server.editors import EDITORS, MissingEditor, editor_of
+
+
+def test_editors_of_the_page_are_found_by_entry_points() -> None:
+    assert list(EDITORS) == ["design", "label", "studio"]
+    assert "--corpus DIR" in editor_of("label", Settings(), may_save=True).answer('{"id": 1, "type": "list"}')
+
+
+def test_editor_that_cannot_be_loaded_says_so_in_each_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Broken(dict[str, object]):
+        def __missing__(self, name: str) -> object:
+            raise PluginError(f"{name} needs the package x")
+
+    monkeypatch.setattr(editors, "EDITORS", Broken())
+    editor = editor_of("label", Settings(), may_save=True)
+    fault = "label needs the package x"
+    assert json.loads(editor.answer('{"id": 7}')) == {"id": 7, "error": fault}
+    assert json.loads(editor.answer(b'\x09\x00\x00\x00{"id": 8}' + bytes(9))) == {"id": 8, "error": fault}
+    for text in ("{", "[]", b"", "[" * 100_000):
+        assert json.loads(editor.answer(text)) == {"id": None, "error": fault}
+    editor.close()
+    assert isinstance(editor, MissingEditor)
