@@ -2,10 +2,11 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Iterator, Sized
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
+from operator import length_hint
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 from realizer.core.errors import RealizerError
@@ -59,11 +60,12 @@ def count(steps: int = 1) -> None:
 
 def counted(items: Iterable[T], steps: int = 1) -> Iterator[T]:
     """Return an iterator over items that counts so many steps for each."""
-    if isinstance(items, Sized) and len(items) <= TOGETHER:
-        if items:
-            count(steps * len(items))
-        return iter(items)
-    return _counted(items, steps)
+    size = length_hint(items, TOGETHER + 1)
+    if size > TOGETHER:
+        return _counted(items, steps)
+    if size:
+        count(steps * size)
+    return iter(items)
 
 
 def _counted(items: Iterable[T], steps: int) -> Iterator[T]:

@@ -233,12 +233,10 @@ def _add_lengths(
         if timing.rigid:
             network.add_chain(begin, problem.earliest[b], ())
             continue
-        least, most = timing.arrays.least, timing.arrays.most
-        if most is None and len(places) > 1:
-            stated = list(least)
-            drop_least_gaps(stated, [(i, (ties.find(first + i), ties.shift[first + i])) for i in places])
-            least = tuple(stated)
+        least = timing.least.tolist()
+        if timing.most is None and len(places) > 1:
+            drop_least_gaps(least, [(i, (ties.find(first + i), ties.shift[first + i])) for i in places])
         network.add_chain(begin, problem.earliest[b], [sum(least[i:j]) for i, j in pairwise(places)])
-        for k, seconds in enumerate(most or (), begin):
+        for k, seconds in enumerate(() if timing.most is None else timing.most.tolist(), begin):
             if seconds < inf:
                 network.add(Link(k + 1, k, -seconds))

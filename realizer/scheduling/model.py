@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import accumulate, chain
 from typing import TypeAlias
 
 import numpy as np
@@ -79,45 +80,33 @@ def model_of(problem: Problem) -> Model | list[int]:
 
     work.count(n // 4)
     timings = problem.timings
-    size = len(timings)
     first = np.array(problem.first, np.intp)
-    last = np.append(first[1:], n) - 1
     owner = np.array(problem.owner, np.intp)
-    owner[ORIGIN] = size
-    # Every point but the first of a behaviour ends a gap.
-    starts = np.ones(n, np.bool_)
-    starts[last] = starts[ORIGIN] = False
-    every = np.flatnonzero(starts)
+    owner[ORIGIN] = len(timings)
+    flexible = [(p, timing) for p, timing in zip(problem.first, timings, strict=True) if not timing.rigid]
+    gap = [k for p, timing in flexible for k in range(p, p + len(timing.preferred))]
+    work.count(n // 4)
     wanted, stiffness, least = (
-        np.concatenate([getattr(t, name) for t in timings]) if timings else np.zeros(0)
+        np.concatenate([np.zeros(0), *(getattr(timing, name) for _, timing in flexible)])
         for name in ("preferred", "stiffness", "least")
     )
-    most = np.full(len(every), np.inf)
-    if any(t.most is not None for t in timings):
-        bounds = [np.full(t.preferred.shape, np.inf) if t.most is None else t.most for t in timings]
-        most = np.concatenate(bounds)
+    most = [np.full(t.preferred.shape, np.inf) if t.most is None else t.most for _, t in flexible]
     work.count(n // 4)
-    rigid = np.array([t.rigid for t in timings], np.bool_)
-    if rigid.any():
-        free = ~rigid[owner[every]]
-        stiffness = np.where(free, stiffness, 1.0)
-    else:
-        free = np.ones(len(every), np.bool_)
     return Model(
         problem,
         first,
-        last,
+        np.append(first[1:], n) - 1,
         owner,
         root,
         shift,
         np.array(tied, np.intp),
-        _along(every, wanted, first, owner),
-        _along(every, 1.0 / stiffness, first, owner),
-        every[free],
-        wanted[free],
-        least[free],
-        most[free],
-        stiffness[free],
+        _along(t.preferred for t in timings),
+        _along(np.ones(len(t.preferred)) if t.rigid else 1.0 / t.stiffness for t in timings),
+        np.array(gap, np.intp),
+        wanted,
+        least,
+        np.concatenate([np.zeros(0), *most]),
+        stiffness,
         np.array(problem.earliest),
     )
 
@@ -136,10 +125,7 @@ def drop_least_gaps(least: list[float], points: Iterable[tuple[int, tuple[int, f
         seen[root] = place, shift
 
 
-def _along(gap: Index, length: Float64, first: Index, owner: Index) -> Float64:
-    """Return (n,) the sum of a behaviour's lengths before each of its points."""
-    step = np.zeros(len(owner))
-    step[gap + 1] = length
-    total = np.cumsum(step)
-    total[ORIGIN + 1 :] -= total[first][owner[ORIGIN + 1 :]]
-    return total
+def _along(lengths: Iterable[Float64]) -> Float64:
+    """Return (n,) the sum of a behaviour's lengths before each of its points; 0 for the block's start."""
+    sums = (accumulate(own.tolist(), initial=0.0) for own in lengths)
+    return np.array([0.0, *chain.from_iterable(sums)])

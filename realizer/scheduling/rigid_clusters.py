@@ -3,7 +3,6 @@
 Behaviours tied without a contradiction keep their preferred gaps; only the rest needs a solver.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,12 +38,22 @@ def clusters_of(model: Model) -> RigidClusters:
     tied = model.tied
     # The seconds from the root of a point's class to the first point of its behaviour.
     ahead = (model.shift[tied] - model.chain[tied]).tolist()
+    ties = UnionFind(
+        size
+    )  # of first points; behaviours are attached to each other at their preferred lengths
+    strained: list[int] = []  # those that do not fit
+    held_at: list[tuple[int, float]] = []  # of each point at a fixed time: the seconds of its first point
+    hook: dict[int, tuple[int, float]] = {}
     knots = zip(model.owner[tied].tolist(), model.root[tied].tolist(), ahead, strict=True)
-    ties, strained, held_at = attach(size, knots)
-    label, base = np.arange(size + 1), np.zeros(size + 1)
-    touched = _each(model.owner[model.tied], size)
-    label[touched] = [ties.find(b) for b in touched.tolist()]
-    base[touched] = [ties.shift[b] for b in touched.tolist()]
+    for b, root, start in work.counted(knots):
+        if root == ORIGIN:
+            held_at.append((b, start))
+            continue
+        other, other_start = hook.setdefault(root, (b, start))
+        if abs(ties.tie(b, other, start - other_start)) > FITS:
+            strained.append(b)
+    label = np.array([*map(ties.find, range(size)), size])
+    base = np.array([*ties.shift, 0.0])
     held = np.zeros(size + 1, np.bool_)
     held[size] = True
     fixed: dict[int, float] = {}
@@ -66,36 +75,6 @@ def clusters_of(model: Model) -> RigidClusters:
         bent[[ties.find(b) for b in strained]] = True
         _relax(model, clusters, bent[label])
     return clusters
-
-
-def attach(
-    size: int, knots: Iterable[tuple[int, int, float]]
-) -> tuple[UnionFind, list[int], list[tuple[int, float]]]:
-    """Attach behaviours to each other at their preferred lengths.
-
-    Args:
-        knots: of each tied point its behaviour, the root of its class, and the seconds from that root to the
-            first point of the behaviour.
-
-    Returns:
-        ties between behaviours (of their first points), the behaviours that do not fit, and for each point at
-        a fixed time (behaviour, seconds of its first point).
-    """
-    ties = UnionFind(size)
-    strained: list[int] = []
-    held: list[tuple[int, float]] = []
-    hook: dict[int, tuple[int, float]] = {}
-    for b, root, start in work.counted(knots):
-        if root == ORIGIN:
-            held.append((b, start))
-            continue
-        if (hooked := hook.get(root)) is None:
-            hook[root] = b, start
-            continue
-        other, other_start = hooked
-        if abs(ties.tie(b, other, start - other_start)) > FITS:
-            strained.append(b)
-    return ties, strained, held
 
 
 def _relax(model: Model, clusters: RigidClusters, chosen: Bool) -> None:

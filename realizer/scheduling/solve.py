@@ -17,9 +17,8 @@ from realizer.scheduling.groups import Group, groups_of, slides, solve_groups
 from realizer.scheduling.model import LOOSE, TIGHT, Model, model_of
 from realizer.scheduling.problem import ORIGIN, Problem
 from realizer.scheduling.rigid_clusters import RigidClusters, clusters_of
-from realizer.scheduling.small_solver import solve_small
 
-# Up to this many points plain floats are faster than arrays.
+# Up to this many points the conflicts of fewest statements are searched.
 FEW = 128
 
 
@@ -38,8 +37,6 @@ def solve(problem: Problem) -> Solution | list[Conflict]:
     statements; those of a large one are found in one pass.
     """
     is_small = len(problem.owner) <= FEW
-    if is_small and (found := solve_small(problem)) is not None:
-        return Solution(np.array(found[0]), found[1])
     model = model_of(problem)
     if isinstance(model, list) and is_small:
         graph = ConstraintGraph(problem, model)

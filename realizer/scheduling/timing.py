@@ -18,19 +18,6 @@ UNKNOWN = 5e5
 SOFTER = 1e-6
 
 
-class TimingArrays(NamedTuple):
-    """The numbers of a Timing of k points as plain floats."""
-
-    chain: tuple[float, ...]  # (k,) seconds after the first point if every gap has its preferred length
-    # (k,) the same for 1 / stiffness: how much a unit of force lengthens the gaps before a point
-    slack: tuple[float, ...]
-    # least, most: (k-1,) of each gap
-    least: tuple[float, ...]
-    most: tuple[float, ...] | None
-    rigid: bool
-    fits: bool  # whether all preferred lengths are within their bounds, as those of rigid behaviours are
-
-
 @dataclass(frozen=True)
 class Timing:
     """The timing that one behaviour prefers: k sync points, k-1 gaps."""
@@ -69,21 +56,6 @@ class Timing:
         stiffness = self.stiffness.copy()
         stiffness[stiffness.argmin()] *= SOFTER
         return replace(self, stiffness=stiffness)
-
-    @cached_property
-    def arrays(self) -> TimingArrays:
-        slack = np.ones(len(self.points) - 1) if self.rigid else 1.0 / self.stiffness
-        fits = bool((self.preferred >= np.maximum(self.least, 0.0)).all())
-        if self.most is not None:
-            fits = fits and bool((self.preferred <= self.most).all())
-        return TimingArrays(
-            (0.0, *np.cumsum(self.preferred).tolist()),
-            (0.0, *np.cumsum(slack).tolist()),
-            tuple(self.least.tolist()),
-            None if self.most is None else tuple(self.most.tolist()),
-            self.rigid,
-            self.rigid or fits,
-        )
 
 
 class Clause(NamedTuple):

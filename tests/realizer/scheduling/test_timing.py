@@ -53,28 +53,6 @@ def test_timing_wants_bounds_with_room() -> None:
         timing(most=[0.4, 3.0])
 
 
-def test_timing_arrays_add_up_lengths_and_slack() -> None:
-    arrays = timing().arrays
-    assert arrays.chain == (0.0, 1.0, 3.0)
-    assert arrays.slack == (0.0, 0.25, 0.75)
-    assert (arrays.least, arrays.most) == ((0.5, 0.5), None)
-    assert timing(rigid=True).arrays.slack == (0.0, 1.0, 2.0)
-
-
-@pytest.mark.parametrize(
-    ("one", "fits"),
-    [
-        (timing(), True),
-        (timing(least=1.5), False),
-        (timing(least=1.5, rigid=True), True),
-        (timing(most=[1.0, 2.0]), True),
-        (timing(most=[1.0, 1.9]), False),
-    ],
-)
-def test_timing_arrays_tell_whether_preferred_lengths_fit(one: Timing, fits: bool) -> None:
-    assert one.arrays.fits == fits
-
-
 def test_warning_has_a_clash_in_json_only_if_there_is_one() -> None:
     assert Warning("b1", "T", "text").to_json() == {"id": "b1", "type": "T", "text": "text"}
     clause = Clause("b1:a", 2, "a:start = 1")
