@@ -56,6 +56,7 @@ def _parts() -> Iterator[Finding]:
     """Yield what works, or how to fix it, as soon as it is known."""
     from realizer.face.load import list_faces, load_face
     from realizer.render.drawing_process import available_backend
+    from realizer.speech.align.sphinx import install_hint
     from realizer.speech.registry import voices
 
     descriptions = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
@@ -63,6 +64,8 @@ def _parts() -> Iterator[Finding]:
     yield fix is None, "pictures", fix or descriptions[backend]
     for voice in voices():
         yield voice.available, voice.name, voice.description
+    fix = install_hint()
+    yield fix is None, "align", fix or "pocketsphinx finds words in recordings of English"
     fix = _fix("film")
     yield fix is None, "FFmpeg", fix or "PyAV writes films"
     works = shutil.which("npm") is not None

@@ -1,6 +1,7 @@
 """The aligner for English, by the acoustic model of pocketsphinx, which only this module imports."""
 
 import importlib.util
+import sys
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,9 @@ from realizer.speech.align.alignment import Alignment, build, probability
 from realizer.speech.utterance import Phoneme, Utterance
 
 INSTALL = "no aligner of English: pip install 'bml-realizer[align]'"
+NO_WHEEL = (
+    "no aligner of English: pocketsphinx has no wheels for Python 3.14 and later; use Python 3.11 to 3.13"
+)
 FRAME = 0.01  # s
 
 _lock = threading.Lock()  # decoders are not thread-safe
@@ -30,8 +34,10 @@ class AlignedWord:
 
 
 def install_hint() -> str | None:
-    """Return a sentence that says how to install pocketsphinx, or None if it is installed."""
-    return None if importlib.util.find_spec("pocketsphinx") else INSTALL
+    """Return a sentence that says what to install for pocketsphinx, or None if it is installed."""
+    if importlib.util.find_spec("pocketsphinx"):
+        return None
+    return INSTALL if sys.version_info < (3, 14) else NO_WHEEL
 
 
 def align_words(

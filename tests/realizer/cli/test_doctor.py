@@ -6,6 +6,7 @@ import json
 import shutil
 import sys
 from importlib.metadata import EntryPoint, EntryPoints
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ def test_doctor_names_every_part_and_exits_with_0() -> None:
 
 
 def test_doctor_says_how_to_fix_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    _fix.cache_clear()
     monkeypatch.setitem(sys.modules, "av", None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", "install GL"))
@@ -39,6 +41,21 @@ def test_doctor_says_how_to_fix_what_is_missing(monkeypatch: pytest.MonkeyPatch)
     assert missing["pictures"] == "install GL"
     assert missing["faces"].startswith("no face folder was found")
     assert missing["node"].startswith("not needed to run")
+
+
+@pytest.mark.parametrize(
+    ("python", "fix"),
+    [((3, 13), "pip install 'bml-realizer[align]'"), ((3, 14), "pocketsphinx has no wheels for Python 3.14")],
+)
+def test_doctor_says_which_pythons_have_an_aligner(
+    python: tuple[int, int], fix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pocketsphinx", None)
+    monkeypatch.setattr("realizer.speech.align.sphinx.sys", SimpleNamespace(version_info=python))
+    monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", None))
+    (line,) = (line for line in run("doctor").stdout.splitlines() if line.split()[1] == "align")
+    assert line.startswith("missing")
+    assert fix in line
 
 
 def test_doctor_shows_the_fault_of_a_face(monkeypatch: pytest.MonkeyPatch) -> None:
