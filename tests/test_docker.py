@@ -266,6 +266,26 @@ def test_install_script_prints_its_usage() -> None:
     assert "TARGET" in done.stderr
 
 
+def test_install_script_takes_versions_and_hashes_from_the_lock_file(tmp_path: Path) -> None:
+    stub, target = tmp_path / "bin" / "python3", tmp_path / "target"
+    stub.parent.mkdir()
+    (target / "bin").mkdir(parents=True)
+    for program in (stub, target / "bin" / "realizer"):
+        program.write_text('#!/bin/sh\necho "$*"\n')
+        program.chmod(0o755)
+    path = f"{stub.parent}{os.pathsep}{os.environ['PATH']}"
+    done = checked(DOCKER / "install.sh", target, PATH=path, WHEEL="dist/made.whl").splitlines()
+    pip = f"-m pip --python {target}/bin/python3"
+    install = f"{pip} install --quiet --no-cache-dir"
+    assert done == [
+        f"-m venv --without-pip {target}",
+        f"{install} --require-hashes --requirement {DOCKER}/requirements.txt",
+        f"{install} --no-deps dist/made.whl",
+        f"{pip} check",
+        "--version",
+    ]
+
+
 @pytest.mark.long
 @pytest.mark.slow
 def test_install_script_installs_realizer_without_pip(installed: Path) -> None:
