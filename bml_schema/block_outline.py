@@ -4,10 +4,11 @@ from typing import Any, NamedTuple
 
 from lxml import etree
 
-from bml_schema.behaviours import SpeechText, Sync
+from bml_schema.behaviours import SpeechText
 from bml_schema.element_reader import ElementReader
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
+from bml_schema.ssml import ANY_MARK, mark_of
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names, Points
 
@@ -108,7 +109,7 @@ class BlockOutline:
         for child in element:
             tag = self.elements.tag(child)
             if tag == SpeechText.tag:
-                marks += [s.get("id", "").strip() for s in child if self.elements.tag(s) == Sync.tag]
+                marks += [mark_of(mark) for mark in child.iterdescendants(*ANY_MARK)]
             elif tag == Description.tag:
                 # It may name points that the core text does not have.
                 marks += [m.get("name", "").strip() for m in child.iterdescendants("{*}mark")]

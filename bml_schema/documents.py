@@ -26,6 +26,7 @@ from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
 from bml_schema.node_schema import local
 from bml_schema.nodes import Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
+from bml_schema.ssml import document_of, start_of_speak
 from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
@@ -115,7 +116,8 @@ def read(
     Yields:
         A Block for each document, and a BMLError for each part of the text without one.
     """
-    reader = _Reader(vocabulary, max_behaviours, strict_bml, block_ids or made_ids())
+    block_ids = block_ids or made_ids()
+    reader = _Reader(vocabulary, max_behaviours, strict_bml, block_ids)
     data, wrapper, roots = _parse_at_once(text, max_bytes, strict_bml)
     if 0 < len(roots) <= max_documents:
         reader.wrapper, begins = wrapper, _begins(data)
@@ -131,6 +133,12 @@ def read(
         spans = list(document_spans(text))
     except BMLError as error:
         yield error
+        return
+    if not strict_bml and not any(span.tag for span in spans) and (start := start_of_speak(text)) >= 0:
+        try:
+            yield _spoken(text[start:], text.count("\n", 0, start), reader, max_bytes)
+        except BMLError as error:
+            yield error
         return
     if spans and not strict_bml and (around := WRAPPER_TAG.search(text, 0, spans[0].start)):
         reader.wrapper = around[1]
@@ -314,6 +322,29 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
         root, note = found
         notes = (note,) if note else ()
     return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
+
+
+# "&" and "<" that begin no markup.
+_BARE = re.compile(rb"&(?!#?\w+;)|<(?![A-Za-z_:/!?\x80-\xff])")
+
+
+def _escaped(bare: re.Match[bytes]) -> bytes:
+    return b"&amp;" if bare[0] == b"&" else b"&lt;"
+
+
+def _spoken(text: str, lines_before: int, reader: _Reader, max_bytes: int) -> Block:
+    """Read a <speak> document; if it is not well-formed, what can be read of it, with a note."""
+    data = _encoded(text, 1, None)
+    if len(data) > max_bytes:
+        raise BMLSizeError(f"wanted at most {max_bytes} bytes in a document, got {len(data)}", line=1)
+    notes: tuple[str, ...] = ()
+    try:
+        root = element(data, lines_before=lines_before)
+    except BMLSyntaxError as error:
+        root = etree.fromstring(_BARE.sub(_escaped, data), xml_parser(recover=True))
+        notes = (f"{error.text} in <speak>: what can be read of it is spoken",)
+    document = document_of(root, next(reader.block_ids))
+    return reader.read(document, {}, lines_before=lines_before, notes=notes)
 
 
 _PARSER = xml_parser()

@@ -34,7 +34,9 @@ from bml_schema.nodes import (
     core,
     extension,
 )
+from bml_schema.ssml import described, is_marked_up
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
+from bml_schema.text_reader import read_mixed
 from bml_schema.values import NUMBER, describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]
@@ -98,7 +100,7 @@ class ElementReader:
         schema = schema_of(cls)
         values = self.attributes(schema, element, timed)
         if schema.mixed:
-            values[schema.mixed] = tuple(self.mixed(schema, element))
+            values[schema.mixed] = tuple(read_mixed(self, schema, element))
         elif schema.text:
             values[schema.text] = self.text(element)
         elif schema.children or len(element):
@@ -206,6 +208,8 @@ class ElementReader:
                 spec = schema.by_local.get(local(tag))
             if spec is not None:
                 nodes_by_field.setdefault(spec[0].field, []).append(self.node(spec[1], child))
+                if self.lenient and spec[1] is SpeechText and is_marked_up(child):
+                    descriptions.append(described(child))
             elif tag.startswith(_OURS):
                 near = self.suggest(local(tag), map(local, schema.by_tag))
                 raise Fault(f"wanted {schema.listed}, got <{local(tag)}>{near}", child)
@@ -234,27 +238,6 @@ class ElementReader:
         if text := next((t.strip() for t in texts if t and not t.isspace()), ""):
             hint = ", put it into <text>" if self.tag(element) == Speech.tag else ""
             raise Fault(f"wanted elements, got the text {quoted(text)}{hint}", element)
-
-    def mixed(self, schema: NodeSchema, element: etree._Element) -> Iterator[Any]:
-        """Read text := (characters | sync)*, with whitespace as written."""
-        text = element.text or ""
-        for child in element:
-            spec = schema.by_tag.get(self.tag(child))
-            if spec is None:
-                name = local(str(child.tag))
-                near = self.suggest(name, map(local, schema.by_tag))
-                raise Fault(f"wanted text and {schema.listed}, got <{name}>{near}", child)
-            if child.get("id", "").strip() == "bml":
-                message = 'id: "bml" means the block in references, so this <sync> does nothing'
-                self.remarks.append(Fault(message, child, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
-            else:
-                if text:
-                    yield text
-                yield self.node(spec[1], child)
-                text = ""
-            text += child.tail or ""
-        if text:
-            yield text
 
     def text(self, element: etree._Element) -> str:
         if len(element):

@@ -100,9 +100,14 @@ def one_of(*words: str) -> Value:
 
 
 _NAME = re.compile(rf"[^\s:]{{1,{_MAX_NAME}}}")
-_read_name = _stripped(
-    lambda text: text != "bml" and ((text.isalnum() and len(text) <= _MAX_NAME) or _NAME.fullmatch(text))
-)
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text, without blanks around it, can be the id of a behaviour or a sync."""
+    return text != "bml" and bool((text.isalnum() and len(text) <= _MAX_NAME) or _NAME.fullmatch(text))
+
+
+_read_name = _stripped(is_name)
 _read_block_name = _stripped(
     lambda text: text not in ("", "bml") and ":" not in text and len(text) <= _MAX_NAME
 )

@@ -9,6 +9,7 @@ from bml_schema.dialects.table import Row, table
 from bml_schema.dialects.values import language_tag
 from bml_schema.node_schema import local
 from bml_schema.nodes import LANGUAGE
+from bml_schema.ssml import ELEMENTS
 
 _MARKS = {"sync": "id", "tm": "id", "mark": "name"}
 
@@ -60,11 +61,11 @@ def _rewrite(text: Any, source: Any, apply: Callable[[Row], None]) -> None:
 
 
 def _is_marked(text: Any) -> bool:
-    return any(local(str(child.tag)) in ("tm", "mark") for child in text)
+    return any(local(str(child.tag)) == "tm" for child in text.iterdescendants())
 
 
 class _Content:
-    """The words and <sync> elements of a text, in order, inside an element."""
+    """The words, <sync> elements and SSML of a text, in order, inside an element."""
 
     def __init__(self, tag: str, apply: Callable[[Row], None]) -> None:
         self.tag = tag
@@ -80,7 +81,7 @@ class _Content:
             self.last.tail = (self.last.tail or "") + (text or "")
 
     def add(self, element: Any) -> None:
-        """Add an element: a mark as a sync, any other as the words inside it."""
+        """Add an element: a mark as a sync, SSML as it is, any other as the words inside it."""
         name = local(str(element.tag))
         row = table().elements.get(name)
         if row is not None:
@@ -94,6 +95,15 @@ class _Content:
                 sync.sourceline = element.sourceline
                 self.element.append(sync)
                 self.last = sync
+        elif name in ELEMENTS:
+            inside = _Content(self.tag, self.apply)
+            inside.element, inside.ids = etree.Element(element.tag, element.attrib), self.ids
+            inside.add_text(element.text)
+            for child in element:
+                inside.add(child)
+                inside.add_text(child.tail)
+            self.element.append(inside.element)
+            self.last = inside.element
         elif row is None or row.becomes != "-":
             self.add_text(element.text)
             for child in element:

@@ -103,6 +103,8 @@ class _Translation:
             if renamed != name and not self._attributes(element, renamed):
                 continue
             name = renamed
+            if name == "text":  # its content is words, syncs and SSML
+                continue
             for row in self.table.missing.get(name, ()) if self.in_dialect else ():
                 if not element.get(row.attribute, "").strip():
                     self._apply(row)

@@ -15,6 +15,8 @@ class BaseVoice(ABC):
     name: str  # the name in the registry of voices, followed by a colon and the voice, if any
     engine: str = ""  # the name of the engine, for lists
     description: str = ""  # one sentence, for lists
+    # the elements of SSML that it changes its way of speaking for, of `ssml.SPOKEN`
+    elements: frozenset[str] = frozenset({"prosody", "sub"})
 
     def __init__(self, voice: str | None = None) -> None:
         if voice:

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 from realizer.core.errors import VoiceError
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.ssml import Break, Script, read_script
+from realizer.speech.ssml_support import supported
 from realizer.speech.utterance import SpeechRequest, Utterance
 
 RUN = Path(__file__).with_name("engine_worker.py")
@@ -228,7 +229,7 @@ class EngineVoice(BaseVoice):
         return self._process.pid
 
     def _speak(self, request: SpeechRequest) -> Utterance:
-        script = read_script(request)
+        script = supported(read_script(request), self.elements, self.engine)
         if script.is_silent and not any(isinstance(part, Break) for part in script.parts):
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)
         return self._synthesize(request, script)

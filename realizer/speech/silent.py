@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from realizer.speech.base_voice import BaseVoice
 from realizer.speech.letter_to_sound import GENERIC, letters_to_phonemes, syllable_facts, vowel_units
 from realizer.speech.ssml import Mark, read_script
+from realizer.speech.ssml_support import supported
 from realizer.speech.utterance import STRETCH, SpeechRequest, Utterance, Word, tile
 from realizer.speech.words import Pause, WordToken, tokens
 from realizer.tables.phonemes import vowels
@@ -25,7 +26,7 @@ class SilentVoice(BaseVoice):
 
     def say(self, request: SpeechRequest) -> Utterance:
         """Estimate times: a word lasts a unit (0.2 s at rate 1) for each vowel, a punctuation mark one."""
-        script = read_script(request)
+        script = supported(read_script(request), self.elements, "the silent voice")
         facts = syllable_facts()
         if script.is_silent and not any(not isinstance(part, (str, Mark)) for part in script.parts):
             return Utterance(0.0, (), (), dict.fromkeys(script.marks, 0.0), warnings=script.warnings)

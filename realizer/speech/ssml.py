@@ -7,30 +7,38 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
 
+from bml_schema.errors import did_you_mean
 from bml_schema.escape import ILLEGAL
+from bml_schema.ssml import APART, HIDDEN
 from realizer.core.errors import VoiceError
-from realizer.speech.ssml_prosody import is_supported
+from realizer.speech.ssml_prosody import EMPHASIS, is_supported
 from realizer.speech.utterance import MAX_TEXT, SpeechRequest
 
 LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
 
-# SSML 1.1 elements that change how text is spoken, with the attributes that are passed on. `audio` is not
-# among them, because an engine would open the file that it names.
+# SSML 1.1 elements that change how text is spoken, with the attributes that are passed on. `audio` has none,
+# because an engine would open the file that it names.
 SPOKEN: Mapping[str, tuple[str, ...]] = {
+    "audio": (),
     "emphasis": ("level",),
     "lang": ("xml:lang",),
     "p": ("xml:lang",),
     "phoneme": ("alphabet", "ph"),
     "prosody": ("rate", "pitch", "volume", "range", "contour"),
     "s": ("xml:lang",),
-    "say-as": ("interpret-as", "format", "detail"),
+    "say-as": ("interpret-as",),
     "sub": ("alias",),
     "voice": ("xml:lang", "name", "gender", "age", "variant"),
 }
 EMPTY = ("break", "mark", "bookmark", "sync")
 # Elements without an effect on speech: their text is spoken unchanged.
-PLAIN = frozenset({"desc", "lexicon", "lookup", "meta", "metadata", "speak", "token", "w"})
+PLAIN = frozenset({"lookup", "speak", "token", "w"})
+OTHER_NAMES = {"paragraph": "p", "sentence": "s"}  # of SSML 1.0
+# What <say-as> can interpret: as characters, as digits, and as a number, which every voice does.
+CHARACTERS = frozenset({"characters", "spell-out", "verbatim", "letters"})
+DIGITS = frozenset({"digits", "telephone"})
+NUMBERS = frozenset({"cardinal", "number"})
 STRENGTHS = {"none": 0.0, "x-weak": 0.1, "weak": 0.2, "medium": 0.4, "strong": 0.7, "x-strong": 1.2}  # s
 CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
 
@@ -121,7 +129,7 @@ def read_script(request: SpeechRequest) -> Script:
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
         warnings.append("emoji in the text are not spoken")
         parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
-    script = Script(tuple(_collapsed(parts)))
+    script = Script(tuple(collapsed(parts)))
     if script.is_silent:
         warnings.append("the text is empty: nothing is spoken")
     return Script(script.parts, tuple(warnings))
@@ -130,38 +138,72 @@ def read_script(request: SpeechRequest) -> Script:
 def _parse(ssml: str) -> tuple[list[Part], list[str]]:
     parts: list[Part] = []
     odd: list[str] = []
+    hidden = 0  # depth inside elements whose text is not spoken
+    spelled = [frozenset[str]()]  # what the open elements spell: of <say-as>, outermost first
     reader = expat.ParserCreate()
     reader.buffer_text = True
 
     def start(name: str, attributes: dict[str, str]) -> None:
-        name = name.rpartition(":")[2]
+        nonlocal hidden
+        name = _name(name)
+        hidden += name in HIDDEN
+        if name in APART:
+            parts.append(" ")
         if name in EMPTY:
             parts.extend(_point(name, attributes, odd))
+        elif name == "say-as":
+            odd.extend(_unsupported(name, attributes))
+            kind = attributes.get("interpret-as", "")
+            spelled.append(next((kinds for kinds in (CHARACTERS, DIGITS) if kind in kinds), frozenset()))
+            if spelled[-1] is CHARACTERS:
+                parts.append(Tag(name, (("interpret-as", "characters"),)))
         elif name in SPOKEN:
-            if name == "prosody":
-                odd.extend(
-                    f'{key}="{value[:40]}" of prosody is not understood'
-                    for key, value in attributes.items()
-                    if not is_supported(key, value)
-                )
+            odd.extend(_unsupported(name, attributes))
             kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
             parts.append(Tag(name, tuple(kept)))
-        elif name not in PLAIN:
-            odd.append(f"<{name[:40]}> is not SSML for speech: it is ignored, but its text is spoken")
+        elif name not in PLAIN | HIDDEN:
+            near = did_you_mean(name, (*SPOKEN, *EMPTY))
+            odd.append(f"<{name[:40]}> is not SSML for speech{near}: it is ignored, but its text is spoken")
 
     def end(name: str) -> None:
-        name = name.rpartition(":")[2]
-        if name in SPOKEN:
+        nonlocal hidden
+        name = _name(name)
+        hidden -= name in HIDDEN
+        if name in SPOKEN and (name != "say-as" or spelled.pop() is CHARACTERS):
             parts.append(Tag(name, None))
+        if name in APART:
+            parts.append(" ")
 
     def text(characters: str) -> None:
-        parts.append(characters)
+        if spelled[-1] is DIGITS:
+            characters = re.sub(r"(?<=\w)(?=\w)", " ", characters)
+        if not hidden:
+            parts.append(characters)
 
     reader.StartElementHandler = start
     reader.EndElementHandler = end
     reader.CharacterDataHandler = text
     reader.Parse(f"<speak>{ssml}</speak>".encode(), True)
     return parts, list(dict.fromkeys(odd))
+
+
+def _name(tag: str) -> str:
+    name = tag.rpartition(":")[2]
+    return OTHER_NAMES.get(name, name)
+
+
+def _unsupported(name: str, attributes: Mapping[str, str]) -> Iterator[str]:
+    """Yield a sentence for each value of an attribute that no voice understands."""
+    if name == "prosody":
+        for key, value in attributes.items():
+            if not is_supported(key, value):
+                yield f'{key}="{value[:40]}" of prosody is not understood'
+    elif name == "say-as":
+        kind = attributes.get("interpret-as", "")
+        if kind not in CHARACTERS | DIGITS | NUMBERS:
+            yield f'interpret-as="{kind[:40]}" of say-as is not understood: its text is spoken as usual'
+    elif name == "emphasis" and attributes.get("level", "moderate") not in EMPHASIS:
+        yield f'level="{attributes["level"][:40]}" of emphasis is not understood: taken as moderate'
 
 
 def _point(name: str, attributes: Mapping[str, str], odd: list[str]) -> Iterator[Part]:
@@ -198,7 +240,7 @@ def _scrape(ssml: str) -> Iterator[Part]:
     yield unescape(ssml[place:].replace("<", " "), {"&quot;": '"', "&apos;": "'"})
 
 
-def _collapsed(parts: list[Part]) -> Iterator[Part]:
+def collapsed(parts: list[Part]) -> Iterator[Part]:
     """Yield the parts with adjacent texts joined, blanks collapsed to one space, and no empty text."""
     text = ""
     blank = True  # whether the last text ended in a blank, so that leading blanks are dropped

@@ -18,6 +18,13 @@ VOLUMES = {
     "loud": 1.4,
     "x-loud": 2.0,
 }
+# Level of <emphasis> -> attributes of <prosody> that stand for it in voices without emphasis; our choice.
+EMPHASIS = {
+    "strong": (("rate", "80%"), ("volume", "+3dB")),
+    "moderate": (("rate", "90%"), ("volume", "+1.5dB")),
+    "none": (),
+    "reduced": (("rate", "110%"), ("volume", "-1.5dB")),
+}
 # Attribute -> named steps, least and greatest factor.
 SCALES = {"rate": (RATES, 0.25, 4.0), "pitch": (PITCHES, 0.5, 2.0), "volume": (VOLUMES, 0.0, 4.0)}
 HERTZ = re.compile(r"\s*[+-]?(\d+(?:\.\d+)?|\.\d+)\s*Hz\s*", re.IGNORECASE)

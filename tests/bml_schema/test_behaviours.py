@@ -176,11 +176,6 @@ def test_speech_text_keeps_its_language() -> None:
     ("inside", "said"),
     [
         ("<text>a</text><text>b</text>", "wanted one <text>, got 2"),
-        ("<text><sync id='a'/><sync id='a'/></text>", 'sync: wanted an id of its own, got "a" again'),
-        ("<text><sync id='end'/></text>", 'sync: wanted an id of its own, got "end" again'),
-        ("<text><sync/></text>", "id: wanted a name"),
-        ("<text>a <b>c</b></text>", "wanted text and <sync>, got <b>"),
-        ("<text>a <synk id='m'/></text>", 'wanted text and <sync>, got <synk>, did you mean "sync"?'),
         ("<texte>a</texte>", 'wanted <text>, got <texte>, did you mean "text"?'),
         ("Hello", 'wanted elements, got the text "Hello", put it into <text>'),
         ("<text/>Hello", 'wanted elements, got the text "Hello", put it into <text>'),

@@ -65,10 +65,12 @@ def _stops_first(parts: Sequence[Part]) -> list[Part]:
 
 
 def _in_its_units(tag: Tag) -> Tag:
-    """Return the tag with volume and pitch of <prosody> in espeak-ng's units.
+    """Return the tag with volume and pitch of <prosody> in espeak-ng's units, and <voice> for <lang>.
 
-    It reads decibels and semitones as per cent, and its pitch is a setting, not a factor.
+    It reads decibels and semitones as per cent, its pitch is a setting, not a factor, and it ignores <lang>.
     """
+    if tag.name == "lang":
+        return Tag("voice", tag.attributes)
     if tag.name != "prosody" or tag.attributes is None:
         return tag
     values = dict(tag.attributes)

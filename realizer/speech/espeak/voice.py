@@ -46,6 +46,7 @@ class EspeakVoice(EngineVoice):
     name = "espeak"
     engine = "espeak-ng"
     description = "espeak-ng speaks over 100 languages; a variant is named as in espeak:en-gb+f3 or espeak:nl"
+    elements = frozenset({"emphasis", "lang", "p", "prosody", "s", "say-as", "sub", "voice"})
     worker = ENGINE
     # (voice, word) -> phonemes of the word spoken separately; replaced, never changed.
     _alone: Mapping[tuple[str, str], tuple[str, ...]] = MappingProxyType({})

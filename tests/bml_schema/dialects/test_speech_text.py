@@ -24,7 +24,6 @@ def parts(block: Block) -> list[str]:
         ("<mark name='sp1:T1'/>a", ["<T1>", "a"]),
         ("a <emphasis>b <mark name='m'/>c</emphasis><break/> d", ["a b ", "<m>", "c d"]),
         ("<tm id='t'/>a<pitchaccent id='p' start='s:t'/> b<boundary id='q'/>", ["<t>", "a b"]),
-        ("<text>a <mark name='m'/>b</text>", ["a ", "<m>", "b"]),
         ("a <sync id='m' ref='2'/>b", ["a ", "<m>", "b"]),
     ],
 )
@@ -64,6 +63,10 @@ def test_speech_of_bml_1_0_stays_as_it_is() -> None:
     assert parts(block) == ["a ", "<m>", "b"]
 
 
-def test_speech_with_other_elements_in_its_text_is_a_fault() -> None:
-    (problem,) = only("<speech id='s'><text>a <b>c</b></text></speech>").problems
-    assert problem.text == "wanted text and <sync>, got <b>"
+def test_speech_keeps_its_ssml() -> None:
+    for inside in (
+        "a <emphasis>b <mark name='m'/>c</emphasis><break/>",
+        "<text>a <emphasis>b <tm id='m'/>c</emphasis><break/></text>",
+    ):
+        (description,) = only(f"<speech id='s'>{inside}</speech>")["s"].descriptions
+        assert description.content.endswith('>a <emphasis>b <mark name="m"/>c</emphasis><break/></speak>')

@@ -8,6 +8,7 @@ from realizer.core.errors import VoiceError
 from realizer.speech.espeak.document import write_document
 from realizer.speech.ssml import MAX_TEXT, Break, Mark, Tag, read_script
 from realizer.speech.utterance import SpeechRequest
+from tests.rows import each_row
 
 
 def parts(ssml: str) -> tuple[object, ...]:
@@ -31,8 +32,35 @@ def test_read_script_keeps_elements_of_speech_only() -> None:
     script = read_script(
         SpeechRequest('<prosody rate="fast" onclick="x">a</prosody><audio src="/etc/passwd">b</audio>')
     )
-    assert script.parts == (Tag("prosody", (("rate", "fast"),)), "a", Tag("prosody", None), "b")
+    assert script.parts[:3] == (Tag("prosody", (("rate", "fast"),)), "a", Tag("prosody", None))
+    assert script.text == "a b "
     assert "passwd" not in write_document(script).text
+
+
+@each_row(
+    "ssml, text, warnings",
+    [
+        ("<p>a</p><p>b</p>", "a b ", 0),
+        ("<sentence>a</sentence><paragraph>b</paragraph>", "a b ", 0),
+        ("a<audio><desc>bell</desc>b</audio>", "a b ", 0),
+        ("<metadata><x>a</x></metadata>b", "b", 1),
+        ('<say-as interpret-as="digits">12 ab</say-as>', "1 2 a b", 0),
+        ('<say-as interpret-as="telephone">+49 30</say-as>', "+4 9 3 0", 0),
+        ('<say-as interpret-as="cardinal">12</say-as>', "12", 0),
+        ('<say-as interpret-as="poem">12</say-as><say-as>3</say-as>', "123", 2),
+        ('<emphasis level="mega">a</emphasis>', "a", 1),
+        ("<emphasys>a</emphasys>", "a", 1),
+        ("<w><token>a</token></w>", "a", 0),
+    ],
+)
+def test_read_script_speaks_the_words_of_every_element(ssml: str, text: str, warnings: int) -> None:
+    script = read_script(SpeechRequest(ssml))
+    assert (script.text, len(script.warnings)) == (text, warnings)
+
+
+def test_read_script_suggests_an_element() -> None:
+    (warning,) = read_script(SpeechRequest("<emphasys>a</emphasys>")).warnings
+    assert 'did you mean "emphasis"?' in warning
 
 
 def test_read_script_reads_bml_syncs_as_marks() -> None:
