@@ -28,9 +28,9 @@ from realizer.face.au.units import units
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
-from realizer.facebuild.au.measure import UnitMeasurement, read_shapes
-from realizer.facebuild.au.shapes import measure_shapes
 from realizer.tables import faps
+from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
+from realizer_studio.faces.au.shapes import measure_shapes
 
 # Part of the face -> its feature points.
 PARTS = {

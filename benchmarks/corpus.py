@@ -24,13 +24,13 @@ from pathlib import Path
 
 import numpy as np
 
-from realizer.corpus.films import with_markers
-from realizer.corpus.find import agreement, find
-from realizer.corpus.learn import learn, template_faps
-from realizer.corpus.recording import Annotation, Recording
-from realizer.tracking.markers.colours import named
-from realizer.tracking.markers.film import Look, track_markers
-from realizer.tracking.pictures import read_pictures
+from realizer_studio.corpus.films import with_markers
+from realizer_studio.corpus.find import agreement, find
+from realizer_studio.corpus.learn import learn, template_faps
+from realizer_studio.corpus.recording import Annotation, Recording
+from realizer_studio.tracking.markers.colours import named
+from realizer_studio.tracking.markers.film import Look, track_markers
+from realizer_studio.tracking.pictures import read_pictures
 from tests.painted import hidden, truth, write_film
 
 SEGMENTS = {

@@ -19,7 +19,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realizer.analysis.recognise import Recogniser, recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.emotions.profile import Profile
 from realizer.emotions.wheel import wheel
@@ -28,6 +27,7 @@ from realizer.face.deform import deform
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer.tables.emotions import emotion_model
+from realizer_studio.analysis.recognise import Recogniser, recogniser
 from tests.mesh_features import faps_from_mesh, features_from_mesh, measurable_profile
 
 Counts = dict[str, Counter[str]]

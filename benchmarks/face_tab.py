@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from realizer.facebuild.studio.bare_head import import_bare
+from realizer_studio.editors.face.bare_head import import_bare
 from tests.bare_heads import bare_head
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, serving
 

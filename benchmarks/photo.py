@@ -23,9 +23,9 @@ from realizer.animation.frames import AUFrames
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.facebuild.photo.build import build_from_photographs
 from realizer.render.cameras import Framing, camera_for
 from realizer.render.renderer import Renderer
+from realizer_studio.faces.photo.build import build_from_photographs
 
 SIZE = 1024, 1024
 REST: Mapping[int, float] = {}

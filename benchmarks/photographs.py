@@ -20,12 +20,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw
 
-from realizer.analysis.recognise import recogniser
-from realizer.tracking import regressor
-from realizer.tracking.files import mask, unit_columns
-from realizer.tracking.follower import Person, follow
-from realizer.tracking.pictures import is_picture, read_pictures
-from realizer.tracking.recording import record
+from realizer_studio.analysis.recognise import recogniser
+from realizer_studio.tracking import regressor
+from realizer_studio.tracking.files import mask, unit_columns
+from realizer_studio.tracking.follower import Person, follow
+from realizer_studio.tracking.pictures import is_picture, read_pictures
+from realizer_studio.tracking.recording import record
 
 FOUND = 0.2  # intensity from which a unit counts as found
 WORTH = 0.08  # intensity that is printed

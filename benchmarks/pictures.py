@@ -193,7 +193,7 @@ def rooms(folder: Path, tab: str, options: list[str], prepare: Callable[[Any], N
 
 def corpus(folder: Path) -> Path:
     """A corpus with a film of somebody who speaks, and the labels of two people."""
-    from realizer.corpus.recording import Annotation, Recording, write_recording
+    from realizer_studio.corpus.recording import Annotation, Recording, write_recording
 
     (folder / "anna").mkdir()
     (folder / "corpus.toml").write_text("version = 1\n")

@@ -16,12 +16,12 @@ import numpy as np
 
 import realizer
 from realizer.animation.axis import AU_NAMES
-from realizer.tracking import regressor
-from realizer.tracking.files import unit_columns
-from realizer.tracking.follower import follow
-from realizer.tracking.pictures import read_pictures
-from realizer.tracking.recording import Recording, record
-from realizer.tracking.regressor import SEEN_UNITS
+from realizer_studio.tracking import regressor
+from realizer_studio.tracking.files import unit_columns
+from realizer_studio.tracking.follower import follow
+from realizer_studio.tracking.pictures import read_pictures
+from realizer_studio.tracking.recording import Recording, record
+from realizer_studio.tracking.regressor import SEEN_UNITS
 
 # Action units that are shown one after the other, and together as emotions do.
 SHOWN = (

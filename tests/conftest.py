@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterator
 from functools import cache
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
@@ -78,3 +79,22 @@ def log_levels() -> Iterator[None]:
     yield
     for logger, level in zip(loggers, before, strict=True):
         logger.setLevel(level)
+
+
+@pytest.fixture(autouse=True)
+def _skip_without_gl(request: pytest.FixtureRequest) -> None:
+    if not (mark := request.node.get_closest_marker("gl")):
+        return
+    from realizer.render.drawing_process import unavailable_reason
+
+    if missing := unavailable_reason(*mark.args):
+        assert not re.match(r"\w*Error: ", missing), missing  # it lies with the project, not with the machine
+        pytest.skip(missing)
+
+
+@pytest.fixture
+def balls() -> tuple[Any, Any]:
+    """A head of three balls, and its normals, as `tests.balls` has it."""
+    from tests.balls import face_of_balls
+
+    return face_of_balls()

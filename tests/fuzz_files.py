@@ -28,13 +28,13 @@ from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
 from realizer.expressions.library import library_of
 from realizer.face.load import folder_of, load_face
-from realizer.facebuild.mpeg4.defaults import default_setup
-from realizer.facebuild.mpeg4.faceeditor import read_faceeditor, write_faceeditor
-from realizer.facebuild.mpeg4.parameters import read_setup, write_setup
-from realizer.facebuild.person.recipe import appearance_of, read_recipe
 from realizer.tables.mappings import write_mapping
+from realizer_studio.faces.mpeg4.defaults import default_setup
+from realizer_studio.faces.mpeg4.faceeditor import read_faceeditor, write_faceeditor
+from realizer_studio.faces.mpeg4.parameters import read_setup, write_setup
+from realizer_studio.faces.person.recipe import appearance_of, read_recipe
 from tests.mutants import mutants
-from tests.realizer.facebuild.arkit.conftest import face_glb
+from tests.realizer_studio.faces.arkit.conftest import face_glb
 
 __all__ = ["FILES", "bounded_memory", "file_tried"]
 

@@ -21,12 +21,12 @@ PAGE = "## The page\n"
 # Files without a head: pattern, source, licence.
 DATA = (
     (
-        "realizer/tracking/models/*.tflite",
+        "realizer_studio/tracking/models/*.tflite",
         "MediaPipe by Google, wheel mediapipe 0.10.21, unchanged",
         "Apache-2.0, below",
     ),
     (
-        "realizer/tracking/weights.npz",
+        "realizer_studio/tracking/weights.npz",
         "trained by training/train_action_units.py on pictures of our own heads",
         "MIT",
     ),
@@ -68,7 +68,7 @@ def text() -> str:
     missing = sorted(path for path in shipped() if not _covered(path))
     if missing:
         raise ValueError(f"files without a licence, wanted a line in DATA of tests/licences.py: {missing}")
-    apache = (ROOT / "realizer/tracking/models/LICENSE").read_text("utf-8").strip()
+    apache = (ROOT / "realizer_studio/tracking/models/LICENSE").read_text("utf-8").strip()
     return (
         "\n".join([*parts, "\n## Apache-2.0, of the networks of MediaPipe\n", "```text", apache, "```"])
         + "\n"
@@ -87,7 +87,7 @@ def page() -> str:
 
 def shipped() -> list[str]:
     """Return the files of the repository that are in the wheel."""
-    listed = ("git", "ls-files", "realizer", "bml_schema", "faces")
+    listed = ("git", "ls-files", "realizer", "realizer_studio", "bml_schema", "faces")
     files = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\n")
     return [path for path in files if path and not path.startswith("realizer/server/web/")]
 

@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from realizer.analysis.faps_from_points import faps_from_features, faps_from_points, features_from_points
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.emotions.profile import Profile
 from realizer.face.deform import deform
 from realizer.face.model import Face
+from realizer_studio.analysis.faps_from_points import (
+    faps_from_features,
+    faps_from_points,
+    features_from_points,
+)
 
 __all__ = [
     "faps_from_face",

@@ -13,8 +13,8 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.render.cameras import camera_for
 from realizer.render.renderer import Renderer
-from realizer.tracking.markers.layout import Layout, wojdel
-from realizer.tracking.pictures import Picture
+from realizer_studio.tracking.markers.layout import Layout, wojdel
+from realizer_studio.tracking.pictures import Picture
 
 SIZE = (720, 576)
 CAMERA = "close"

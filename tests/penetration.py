@@ -12,10 +12,10 @@ from realizer.animation.pose import poses
 from realizer.core.array_types import Float32, Float64, Int32
 from realizer.face.drawn_mesh import drawn_mesh
 from realizer.face.model import Face
-from realizer.facebuild.hair.face_cards import depths, without_rim
-from realizer.facebuild.mpeg4.fap_limits import accompanying_faps, usual_range
 from realizer.speech.silent import SilentVoice
 from realizer.tables import action_units, faps
+from realizer_studio.faces.hair.face_cards import depths, without_rim
+from realizer_studio.faces.mpeg4.fap_limits import accompanying_faps, usual_range
 
 __all__ = [
     "DEEPEST",

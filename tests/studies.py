@@ -11,9 +11,9 @@ import numpy as np
 from PIL import Image
 
 from realizer.outputs.csv_table import csv_text
-from realizer.study.answers import COLUMNS
-from realizer.study.items import ANSWERS, EMOTIONS, Item
-from realizer.study.kit import key_of, write_kit
+from realizer_studio.study.answers import COLUMNS
+from realizer_studio.study.items import ANSWERS, EMOTIONS, Item
+from realizer_studio.study.kit import key_of, write_kit
 
 ABOUT = {"judges": 4, "language": "en", "seed": 1, "variants": ["ada"]}
 ROLES = ("right", "removed", "added")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import functools
 import graphlib
+import importlib.metadata
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -13,11 +15,19 @@ import pytest
 
 import bml_schema
 import realizer
+import realizer_studio
 
 # Processes of pytest-xdist would each parse all modules.
 pytestmark = pytest.mark.xdist_group("layers")
 
-ROOTS = {"bml_schema": Path(bml_schema.__path__[0]), "realizer": Path(realizer.__path__[0])}
+ROOTS = {
+    name: Path(package.__path__[0])
+    for name, package in (
+        ("bml_schema", bml_schema),
+        ("realizer", realizer),
+        ("realizer_studio", realizer_studio),
+    )
+}
 
 # Each package may import itself and those to its left.
 LAYERS = (
@@ -30,21 +40,25 @@ LAYERS = (
     "realizer.emotions realizer.expressions realizer.knowledge",
     "realizer.behaviours",
     "realizer.render",
-    "realizer.analysis",
     "realizer.playback",
     "realizer.realization",
     "realizer.pipeline",
     "realizer.outputs realizer.charts realizer.checking",
-    "realizer.tracking",
     "realizer.result realizer.enrichment",
-    "realizer.offline realizer.explained realizer.corpus",
+    "realizer.offline realizer.explained",
     "realizer.protocol",
     "realizer.server",
-    "realizer.facebuild",
-    "realizer.study",
     "realizer.batch realizer.client realizer.asgi",
     "realizer.cli",
     "realizer.__main__",
+    "realizer_studio.analysis",
+    "realizer_studio.tracking",
+    "realizer_studio.corpus",
+    "realizer_studio.faces",
+    "realizer_studio.study",
+    "realizer_studio.editors",
+    "realizer_studio.cli",
+    "realizer_studio",
 )
 LEVELS = {package: level for level, packages in enumerate(LAYERS) for package in packages.split()}
 # Clients load no engine: the messages, the frames and the language are all they share with the service.
@@ -59,21 +73,21 @@ CLIENT = {
 # The packages or modules that may import a heavy library.
 IMPORTERS = {
     "lxml": ("bml_schema",),
-    "trimesh": ("realizer.face", "realizer.facebuild"),
+    "trimesh": ("realizer.face", "realizer_studio.faces", "realizer_studio.editors.face"),
     "numba": ("realizer.render.compiled",),
     "moderngl": ("realizer.render.opengl",),
     "websockets": ("realizer.server", "realizer.client"),
     "av": (
         "realizer.outputs",
         "realizer.behaviours.sound_file",
-        "realizer.tracking.pictures",
+        "realizer_studio.tracking.pictures",
         "realizer.server.http.tracks",
     ),
     "aiortc": ("realizer.server.http",),
     "distributed": ("realizer.batch.dask_cluster",),
-    "ai_edge_litert": ("realizer.tracking.network",),
+    "ai_edge_litert": ("realizer_studio.tracking.network",),
     "clarabel": ("realizer.scheduling",),
-    "click": ("realizer.cli",),
+    "click": ("realizer.cli", "realizer_studio.cli"),
     "espeakng_loader": ("realizer.speech.espeak.worker",),
     "hibari": ("realizer.speech.hibari.voice", "realizer.speech.hibari.worker"),
     "onnxruntime": ("realizer.speech.hibari.worker",),
@@ -98,9 +112,13 @@ def modules() -> list[tuple[str, Path]]:
     return found
 
 
+# A string that names a module, or an object in it: what import_module, a registry or resolve_name is given.
+NAMED = re.compile(rf"(?:{'|'.join(ROOTS)})(?:\.\w+)*(?::\w+)?")
+
+
 @functools.cache
 def imports(path: Path) -> set[str]:
-    """Every dotted name a file imports, also inside functions; `from a import b` counts as a.b and a."""
+    """Every dotted name a file imports, also inside functions; `from a import b` counts as a.b."""
     names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if isinstance(node, ast.Import):
@@ -108,6 +126,17 @@ def imports(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names |= {f"{node.module}.{alias.name}" for alias in node.names}
     return names
+
+
+@functools.cache
+def named(path: Path) -> set[str]:
+    """Every module that a string of a file names, so that it could be imported by it."""
+    strings = (
+        node.value
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+    return {text.partition(":")[0] for text in strings if NAMED.fullmatch(text)}
 
 
 def within(name: str, package: str) -> bool:
@@ -143,18 +172,46 @@ def test_imports_of_heavy_libraries_are_in_one_place() -> None:
                 )
 
 
-def test_imports_have_no_circle() -> None:
-    """No two files import each other, also not inside functions, for types or by way of others."""
+@pytest.mark.parametrize("by", ["imports", "imports and strings"])
+def test_imports_have_no_circle(by: str) -> None:
+    """No two files import each other, also not inside functions, for types, by way of others or by a string.
+
+    The rows of a registry name what is made for it, which knows the registry: they count for packages only.
+    """
     known = dict(modules())
-    graph = {
-        name: {i if i in known else i.rpartition(".")[0] for i in imports(path)} & known.keys() - {name}
-        for name, path in known.items()
-    }
+    graph: dict[str, set[str]] = {}
+    for name, path in known.items():
+        used = {i if i in known else i.rpartition(".")[0] for i in imports(path)}
+        if by == "imports and strings":
+            package = package_of(name) or name
+            used = {package_of(i) or i for i in used | named(path)} - {package}
+            graph.setdefault(package, set()).update(used & LEVELS.keys())
+        else:
+            graph[name] = used & known.keys() - {name}
     try:
         graphlib.TopologicalSorter(graph).prepare()
     except graphlib.CycleError as error:
         # The sorter lists what comes first in front: each imports the one before it.
         pytest.fail("circle of imports: " + " -> ".join(reversed(error.args[1])))
+
+
+def test_what_runs_never_names_the_studio() -> None:
+    for name, path in modules():
+        if not within(name, "realizer_studio"):
+            assert "realizer_studio" not in path.read_text("utf-8"), name
+
+
+def test_entry_points_of_the_project_are_those_of_the_studio() -> None:
+    """What the project finds by entry points can be deleted: all of it is the studio."""
+    points = importlib.metadata.distribution("bml-realizer").entry_points
+    modules = {point.group: point.module for point in points if point.group != "console_scripts"}
+    assert set(modules) == {
+        "realizer.commands",
+        "realizer.editors",
+        "realizer.face_builders",
+        "realizer.trackers",
+    }
+    assert all(within(point.module, "realizer_studio") for point in points if point.group in modules)
 
 
 def test_the_command_line_starts_without_the_heavy_libraries() -> None:
@@ -206,5 +263,6 @@ def test_document_is_realized_without_loading_what_draws_or_serves() -> None:
     loaded = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
-    packages = ("render", "outputs", "charts", "protocol", "server", "facebuild", "checking", "knowledge")
+    packages = ("render", "outputs", "charts", "protocol", "server", "checking", "knowledge")
     assert [n for n in loaded if any(within(n, f"realizer.{package}") for package in packages)] == []
+    assert not [n for n in loaded if within(n, "realizer_studio")]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realizer.analysis.faps_from_points import facial_features
-from realizer.analysis.recognise import recogniser
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
+from realizer_studio.analysis.faps_from_points import facial_features
+from realizer_studio.analysis.recognise import recogniser
 from tests.mesh_features import (
     faps_from_face,
     faps_from_mesh,

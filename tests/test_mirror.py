@@ -9,15 +9,18 @@ import pytest
 
 import bml_schema
 import realizer
+import realizer_studio
 from tests.rows import each_row
 
 TESTS = Path(__file__).parent
 PACKAGES = {
     "bml_schema": Path(bml_schema.__path__[0]),
     "realizer": Path(realizer.__path__[0]),
+    "realizer_studio": Path(realizer_studio.__path__[0]),
 }
-# Tested from outside, by documents and a browser: tests/browser, tests/realizer/test_pipeline.py.
-ELSEWHERE = {"realizer/examples"}
+# Tested from outside: tests/browser, tests/realizer/test_pipeline.py; what a copy without the studio does:
+# tests/test_distribution.py.
+ELSEWHERE = {"realizer/examples", "realizer_studio"}
 
 
 def packages() -> list[str]:

@@ -1,7 +1,7 @@
 """Finds where the 468 landmarks lie on the base mesh: python training/landmark_places.py --data DIR
 
-Our faces are drawn from the front and from the side. What `realizer.tracking.landmarks` sees in the pictures
-is carried back to the surface of the base mesh, and the median over faces and turns is written. With
+Our faces are drawn from the front and from the side. What `realizer_studio.tracking.landmarks` sees in the
+pictures is carried back to the surface of the base mesh, and the median over faces and turns is written. With
 `--without NAME...`, faces are left out that are measured later: the package's table is made without ida.
 """
 
@@ -19,18 +19,18 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from realizer.face.load import folder_of, list_faces, load_face
-from realizer.facebuild.person.makehuman import BaseMesh, data_folder
-from realizer.facebuild.person.person import person_of
-from realizer.facebuild.person.recipe import read_recipe
-from realizer.facebuild.skin.atlas import HEAD
 from realizer.render.cameras import Camera, Framing, camera_for
 from realizer.render.light import presets
 from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
-from realizer.tracking.detector import detect
-from realizer.tracking.landmarks import landmarks
+from realizer_studio.faces.person.makehuman import BaseMesh, data_folder
+from realizer_studio.faces.person.person import person_of
+from realizer_studio.faces.person.recipe import read_recipe
+from realizer_studio.faces.skin.atlas import HEAD
+from realizer_studio.tracking.detector import detect
+from realizer_studio.tracking.landmarks import landmarks
 
-OUTPUT = Path("realizer/facebuild/photo/landmark_places.csv")
+OUTPUT = Path("realizer_studio/faces/photo/landmark_places.csv")
 SIZE = (640, 640)
 TURNS = {
     "front": (-10, 0, 10),

@@ -22,8 +22,8 @@ from realizer.render.light import Light, presets
 from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
 from realizer.tables.cooccurrence import rules
-from realizer.tracking.region import Region
-from realizer.tracking.regressor import UNITS
+from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.regressor import UNITS
 
 # Units that are often seen together (of emotions and of speech), beside random ones.
 TOGETHER = (

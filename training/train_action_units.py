@@ -2,7 +2,8 @@
 
 Our own heads, and random ones that `realizer faces build NAME --random SEED` makes (REALIZER_FACES says
 where they are), are drawn in random expressions, poses and lights. The networks learn what the pictures show
-from what `realizer.tracking.landmarks` sees in them. `--without NAME...` leaves faces out, and measures them.
+from what `realizer_studio.tracking.landmarks` sees in them. `--without NAME...` leaves faces out, and
+measures them.
 """
 
 from __future__ import annotations
@@ -20,8 +21,17 @@ from scipy.spatial.transform import Rotation
 
 from realizer.animation.axis import AU_NAMES
 from realizer.face.load import list_faces
-from realizer.tracking.landmarks import landmarks
-from realizer.tracking.regressor import PARTS, SEEN_FAPS, SEEN_UNITS, UP, WEIGHTS, Components, inputs, upright
+from realizer_studio.tracking.landmarks import landmarks
+from realizer_studio.tracking.regressor import (
+    PARTS,
+    SEEN_FAPS,
+    SEEN_UNITS,
+    UP,
+    WEIGHTS,
+    Components,
+    inputs,
+    upright,
+)
 from training.painted_faces import sitting
 
 PICTURES = 24  # of a sitting

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import realizer
-from realizer.corpus.recording import Annotation, Recording, read_recording, write_recording
+from realizer_studio.corpus.recording import Annotation, Recording, read_recording, write_recording
 from tests.accessibility import serious_faults
 from tests.browser.test_design import drag, warm
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realizer.study.answers import inattentive, read_answers, read_key
-from realizer.study.items import Item, checks
+from realizer_studio.study.answers import inattentive, read_answers, read_key
+from realizer_studio.study.items import Item, checks
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, browser, pytestmark
 from tests.studies import displaced, kit, matches, named
 

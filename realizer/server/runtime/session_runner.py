@@ -10,8 +10,8 @@ from typing import TypeVar
 from realizer.core import work
 from realizer.core.settings import Settings
 from realizer.core.work import FairPool
-from realizer.server.edits.edit_folder import save
 from realizer.server.http.metrics import Metrics
+from realizer.server.runtime.edit_folder import save
 from realizer.server.runtime.engines import Engines
 from realizer.server.runtime.session_registry import ANYBODY, JoinError, SessionRegistry, Visitor
 from realizer.server.runtime.turns import ReadingTurns, SlicedCalls, WakeUps

@@ -103,7 +103,7 @@ def test_voices_has_a_line_for_each_voice() -> None:
 
 
 def test_doctor_prints_json_with_versions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("realizer.facebuild.check.check_face", lambda name: ())
+    monkeypatch.setattr("realizer_studio.faces.check.check_face", lambda name: ())
     monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", None))
     found = json.loads(run("doctor", "--json").stdout)
     assert found["versions"]["numpy"] == np.__version__

@@ -6,8 +6,8 @@ import pytest
 from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer.facebuild.mpeg4.fap_measures import Measure
 from realizer.tables import Fap, faps
+from realizer_studio.faces.mpeg4.fap_measures import Measure
 from tests.rows import each_row
 from tests.shipped import FACES, FOLDERS
 

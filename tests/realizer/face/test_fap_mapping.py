@@ -12,9 +12,9 @@ from realizer.core.errors import FaceError, TableError
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import folder_of, input_names
-from realizer.facebuild.check import check_face
 from realizer.offline import realize
 from realizer.server.session.session import Session
+from realizer_studio.faces.check import check_face
 
 
 @pytest.fixture

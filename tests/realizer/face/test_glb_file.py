@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.face.glb_file import GlbFile, half_turns, quaternions, read_glb
-from realizer.facebuild.arkit.gltf import Gltf
+from realizer_studio.faces.arkit.gltf import Gltf
 
 ARRAYS = {
     "bytes": np.arange(8, dtype=np.uint8).reshape(2, 4),

@@ -10,8 +10,8 @@ import pytest
 from realizer.core.errors import FaceError
 from realizer.face.load import _imported, list_faces, load_face
 from realizer.face.model import Face
-from realizer.facebuild.check import check_face
-from tests.realizer.facebuild.arkit.conftest import face_glb
+from realizer_studio.faces.check import check_face
+from tests.realizer_studio.faces.arkit.conftest import face_glb
 
 FACES = [info.name for info in list_faces()]
 

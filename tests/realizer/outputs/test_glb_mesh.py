@@ -14,9 +14,9 @@ from realizer.core.colours import linear
 from realizer.face.glb_file import GlbFile
 from realizer.face.maps import Maps
 from realizer.face.model import Face
-from realizer.facebuild.arkit.gltf import Gltf
 from realizer.outputs.glb_mesh import GlbMesh, Look, Materials
 from realizer.outputs.morph_targets import MorphTargets
+from realizer_studio.faces.arkit.gltf import Gltf
 
 
 def webp(colour: tuple[int, ...], mode: str) -> bytes:

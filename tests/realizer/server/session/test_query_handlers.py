@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from realizer.protocol.messages.common import MAX_CONTROL
-from realizer.server.edits.edit_folder import save
+from realizer.server.runtime.edit_folder import save
 from tests.realizer.server.conftest import NOD, TALK, Driver
 
 

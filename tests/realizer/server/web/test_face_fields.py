@@ -16,11 +16,11 @@ import pytest
 from realizer.core.settings import Settings
 from realizer.face.deform import deform
 from realizer.face.load import load_folder
-from realizer.facebuild.mpeg4.zones import FALLOFFS
-from realizer.facebuild.studio.bare_head import import_bare
-from realizer.facebuild.studio.head_message import head_message
-from realizer.facebuild.studio.studio import Studio
-from realizer.server.edits.packed_messages import packed
+from realizer_studio.editors.face.bare_head import import_bare
+from realizer_studio.editors.face.head_message import head_message
+from realizer_studio.editors.face.studio import Studio
+from realizer_studio.editors.packed_messages import packed
+from realizer_studio.faces.mpeg4.zones import FALLOFFS
 from tests.bare_heads import bare_head
 
 SCRIPT = Path(__file__).with_name("face_fields.mjs")

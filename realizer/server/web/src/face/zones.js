@@ -1,4 +1,4 @@
-// The field of a FAP by zones of influence, by the formulas of realizer/facebuild/mpeg4 (zones.py, fields.py, build.py).
+// The field of a FAP by zones of influence, by the formulas of realizer_studio/faces/mpeg4 (zones.py, fields.py, build.py).
 
 const SAMPLES = 2001; // of a smooth curve
 const MIN_POWER = 1e-3;

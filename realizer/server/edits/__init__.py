@@ -1,1 +1,0 @@
-"""Files that clients save: `realizer serve --edit DIR`."""

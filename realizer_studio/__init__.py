@@ -1,0 +1,1 @@
+"""Tools that make and analyse faces and corpora. `realizer` finds them by entry points only."""

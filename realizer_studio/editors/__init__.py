@@ -1,0 +1,1 @@
+"""The editors of the page: the tabs Design, Face and Label."""

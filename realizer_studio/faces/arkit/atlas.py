@@ -1,0 +1,241 @@
+"""One atlas of the textures of an imported head's materials, as maps of a face."""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float64
+from realizer.core.colours import linear, srgb
+from realizer.core.errors import FaceError
+from realizer.face.drawn_mesh import GLOSSY
+from realizer_studio.faces.arkit.gltf import Gltf
+from realizer_studio.faces.arkit.materials import CLAMP, MIRROR, Material
+from realizer_studio.faces.arkit.mesh_merge import Surface
+
+# Larger sources are shrunk: a head fills a picture of a thousand pixels with fewer texels than that, and a
+# face of 4096 x 4096 texels takes four times the memory of graphics cards and of the page's first picture.
+SIZE = 2048
+PAD = 8  # texels beyond the edges of each patch, for mean values of neighbours
+NEUTRAL = 16  # texels of the square at the top left that changes nothing
+LEAST = 8  # texels of a patch of one colour
+SHRINK = 0.94  # step by which patches become smaller until all have room
+COARSEST = 0.01  # of the size of the sources
+LARGEST = 8192  # texels of a source that are read along one axis
+# How fine a part's textures are in relation to those of the skin if there is no room for all of them.
+FINENESS = {"hair": 0.7, "beard": 0.7, "upper_teeth": 0.7, "lower_teeth": 0.7, "shirt": 0.4, "other": 0.4}
+QUALITY = {"albedo": 92, "normal": 95, "surface": 92}  # of WebP: 1 to 4 MB together
+
+
+@dataclass(frozen=True, eq=False)
+class Atlas:
+    """The maps of a head."""
+
+    files: Mapping[str, bytes]  # name of a map, as in `face.maps.NAMES` -> WebP
+    uv: Any  # (m, 3, 2) uint16
+    see_through: Bool  # (m,), as in `face.maps.Maps`
+    gloss: Float64  # (m,) of the triangles' materials, as in `Face.gloss`; NaN where the file says nothing
+
+
+@dataclass(frozen=True, eq=False)
+class _Patch:
+    material: Material
+    rows: Any  # triangles
+    uv: Float64  # of their corners, moved to one copy of a repeating texture
+    low: Float64  # the least u and v
+    span: Float64  # how far they go
+    texels: Float64  # width and height in the source
+    fineness: float
+
+
+def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int]]) -> Atlas | None:
+    """Return the maps of a surface, or None if it has no textures.
+
+    Raises:
+        FaceError: an image is missing or too large.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    if not any(surface.materials[k].textures for k in np.unique(surface.material)):
+        return None
+    # Materials that differ by name and roughness alone share a patch.
+    looks: dict[Material, list[int]] = {}
+    for k in np.unique(surface.material).tolist():
+        looks.setdefault(replace(surface.materials[k], name="", roughness=None), []).append(k)
+    patches = [_patch(gltf, surface, look, of, ranges) for look, of in looks.items()]
+    share = 1 / min(FINENESS.values())  # all as fine as in the file
+    while (places := pack(sizes := [_size(patch, share) for patch in patches])) is None:
+        share *= SHRINK
+        if share < COARSEST:
+            raise FaceError(f"{gltf.path}: wanted room for {len(patches)} materials; join some of them")
+    maps = {
+        "albedo": np.full((SIZE, SIZE, 4), 255, np.uint8),
+        "normal": np.full((SIZE, SIZE, 3), (128, 128, 255), np.uint8),
+        "surface": np.full((SIZE, SIZE, 3), 255, np.uint8),
+    }
+    free = np.ones((SIZE, SIZE), bool)
+    free[: NEUTRAL + PAD, : NEUTRAL + PAD] = False
+    uv = np.empty_like(surface.uv)
+    holes = np.zeros(len(uv), bool)
+    for patch, size, (x, y) in zip(patches, sizes, places, strict=True):
+        inner = np.array(size) - 2 * PAD
+        uv[patch.rows] = (np.array((x, y)) + PAD + (patch.uv - patch.low) / patch.span * inner) / SIZE
+        texel = patch.span / inner
+        box = np.concatenate([patch.low - PAD * texel, patch.low + patch.span + PAD * texel])
+        for name, picture in _painted(gltf, patch.material, box, size).items():
+            maps[name][y : y + size[1], x : x + size[0]] = picture
+        free[y : y + size[1], x : x + size[0]] = False
+        holes[patch.rows] = maps["albedo"][y : y + size[1], x : x + size[0], 3].min() < 250
+    # From afar neighbours are mixed: what is near has the colour of a patch, not white.
+    near = distance_transform_edt(free, return_distances=False, return_indices=True)
+    maps["albedo"] = maps["albedo"][tuple(near)]
+    slots = {slot for patch in patches for slot, _ in patch.material.textures}
+    if "normal" not in slots:
+        del maps["normal"]
+    if not slots & {"roughness", "occlusion"}:
+        del maps["surface"]
+    files = {name: _webp(picture, QUALITY[name]) for name, picture in maps.items()}
+    rough = [np.nan if one.roughness is None else one.roughness for one in surface.materials]
+    gloss = np.clip((1 - np.array(rough)) / GLOSSY, 0, 1)[surface.material]
+    return Atlas(files, np.rint(uv * 65535).clip(0, 65535).astype(np.uint16), holes, gloss)
+
+
+def pack(sizes: Sequence[tuple[int, int]]) -> list[tuple[int, int]] | None:
+    """Return the left and upper corner of each patch (width, height) in the atlas, or None without room."""
+    floor = np.zeros(SIZE, int)  # the first free row of each column
+    floor[: NEUTRAL + PAD] = NEUTRAL + PAD
+    places: list[tuple[int, int]] = [(0, 0)] * len(sizes)
+    for k in sorted(range(len(sizes)), key=lambda k: sizes[k][::-1], reverse=True):
+        width, height = sizes[k]
+        if width > SIZE:
+            return None
+        tops = np.lib.stride_tricks.sliding_window_view(floor, width).max(axis=1)
+        x = int(np.argmin(tops))
+        y = int(tops[x])
+        if y + height > SIZE:
+            return None
+        floor[x : x + width] = y + height
+        places[k] = x, y
+    return places
+
+
+def _patch(
+    gltf: Gltf, surface: Surface, material: Material, of: list[int], ranges: Mapping[str, tuple[int, int]]
+) -> _Patch:
+    """Return the patch of the triangles of some materials, which look alike."""
+    rows = np.flatnonzero(np.isin(surface.material, of))
+    uv = surface.uv[rows]
+    for axis, wrap in enumerate(material.chart.wrap):
+        period = {CLAMP: 0, MIRROR: 2}.get(wrap, 1)
+        if period:
+            uv[..., axis] -= np.floor(uv[..., axis].mean(axis=1, keepdims=True) / period) * period
+    texels = np.ones(2)
+    for _, texture in material.textures:
+        pixels = gltf.pixels(texture.image)
+        if pixels is not None:
+            texels = np.maximum(texels, pixels.shape[1::-1])
+    low = uv.min(axis=(0, 1))
+    span = np.maximum(uv.max(axis=(0, 1)) - low, 1 / texels)
+    corners = surface.triangles[rows, 0]
+    inside = [name for name, (first, last) in ranges.items() if ((corners >= first) & (corners < last)).any()]
+    fineness = max((FINENESS.get(name, 1.0) for name in inside), default=1.0)
+    return _Patch(material, rows, uv, low, span, span * texels, fineness)
+
+
+def _size(patch: _Patch, share: float) -> tuple[int, int]:
+    """Return width and height of a patch in the atlas, with what is beyond its edges."""
+    scale = min(1.0, share * patch.fineness, (SIZE - 2 * PAD) / patch.texels.max())
+    width, height = np.maximum(np.ceil(patch.texels * scale), LEAST) + 2 * PAD
+    return int(width), int(height)
+
+
+def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]) -> dict[str, Any]:
+    """Return the maps of one material, each (height, width, channels) uint8.
+
+    Args:
+        box: u, v of the upper left corner, u, v of the lower right one.
+    """
+    textures = dict(material.textures)
+
+    def seen(slot: str, cut: Any = None) -> Any:
+        """Return the picture of a slot as 0..255, or None."""
+        texture = textures.get(slot)
+        pixels = gltf.pixels(texture.image) if texture else None
+        if texture is None or pixels is None:
+            return None
+        return _resampled(cut(pixels) if cut else pixels, box, size, texture.chart.wrap).astype(np.float32)
+
+    factor = material.colour[3]
+
+    def holes(pixels: Any) -> Any:
+        """Cut what is below the cutoff off, or keep alpha, or ignore it."""
+        if material.alpha == "OPAQUE":
+            return pixels[..., :3]
+        if material.alpha == "MASK":
+            solid = pixels[..., 3:] * factor >= 255 * material.cutoff
+            return np.concatenate([pixels[..., :3], 255 * solid.astype(np.uint8)], axis=2)
+        return pixels
+
+    base = seen("base", holes)
+    albedo = np.full((size[1], size[0], 4), 255, np.float32)
+    if base is not None:
+        albedo[..., : base.shape[2]] = base
+    if material.alpha == "BLEND":
+        albedo[..., 3] *= factor
+    light = linear(albedo[..., :3]) * np.array(material.colour[:3], np.float32)
+    if any(material.emission):
+        glow = seen("emission")
+        light = light + (1 if glow is None else linear(glow[..., :3])) * np.array(
+            material.emission, np.float32
+        )
+    albedo[..., :3] = srgb(light) * 255
+    out = {"albedo": albedo}
+    if (normal := seen("normal")) is not None:
+        ups = normal[..., :3] / 127.5 - 1
+        ups[..., :2] *= textures["normal"].amount
+        ups /= np.maximum(np.linalg.norm(ups, axis=2, keepdims=True), 1e-6)
+        out["normal"] = 127.5 * ups + 127.5
+    out["surface"] = np.full((size[1], size[0], 3), 255, np.float32)
+    if (shade := seen("occlusion")) is not None:
+        out["surface"][..., 0] -= (255 - shade[..., 0]) * textures["occlusion"].amount
+    if (rough := seen("roughness")) is not None:
+        out["surface"][..., 1] = rough[..., 1]
+    return {name: np.clip(np.rint(picture), 0, 255).astype(np.uint8) for name, picture in out.items()}
+
+
+def _resampled(pixels: Any, box: Float64, size: tuple[int, int], wrap: tuple[int, int]) -> Any:
+    """Return the part of a texture in a box of u and v as (height, width, channels)."""
+    from PIL import Image
+
+    height, width = pixels.shape[:2]
+    low, high = box[:2] * (width, height), box[2:] * (width, height)
+    first, step, axes = np.floor(low), np.ones(2), []
+    for axis, n in enumerate((width, height)):
+        count = np.ceil(high[axis]) - first[axis]
+        step[axis] = max(1.0, count / LARGEST)
+        at = (first[axis] + step[axis] * np.arange(int(count / step[axis]))).astype(int)
+        if wrap[axis] == CLAMP:
+            at = at.clip(0, n - 1)
+        elif wrap[axis] == MIRROR:
+            at = np.where(at // n % 2 == 0, at % n, n - 1 - at % n)
+        axes.append(at % n)
+    part = pixels[axes[1][:, None], axes[0]]
+    frame = (*((low - first) / step), *((high - first) / step))
+    # Channel by channel: Pillow would blacken what is transparent.
+    return np.stack(
+        [
+            np.asarray(Image.fromarray(part[..., k]).resize(size, Image.Resampling.BICUBIC, frame))
+            for k in range(part.shape[2])
+        ],
+        axis=2,
+    )
+
+
+def _webp(picture: Any, quality: int) -> bytes:
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(picture).save(out, "WEBP", quality=quality, method=4, exact=True)
+    return out.getvalue()

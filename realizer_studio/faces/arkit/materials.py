@@ -1,0 +1,123 @@
+"""The materials of a glTF file: factors and textures of what they look like."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from realizer_studio.faces.arkit.gltf import Gltf
+
+REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
+DRAWN = {  # extensions of materials that the import keeps
+    "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength",
+    "KHR_materials_transmission",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Where the places of a texture come from."""
+
+    name: str = ""  # the attribute, such as TEXCOORD_0
+    offset: tuple[float, float] = (0, 0)  # as in KHR_texture_transform
+    scale: tuple[float, float] = (1, 1)  # as in KHR_texture_transform
+    rotation: float = 0  # as in KHR_texture_transform
+    # What is beyond the edges of the texture along u and v: REPEAT, CLAMP or MIRROR.
+    wrap: tuple[int, int] = (REPEAT, REPEAT)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A picture of a file by its number, and the share of it that counts."""
+
+    image: int
+    chart: Chart
+    amount: float = 1.0
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a surface looks like."""
+
+    name: str  # its name, or ""
+    colour: tuple[float, ...]  # linear RGB and alpha
+    emission: tuple[float, ...]  # linear RGB
+    roughness: float | None  # 0..1, or None if the file says nothing about it
+    alpha: str  # OPAQUE, MASK or BLEND
+    cutoff: float  # alpha below which MASK leaves nothing
+    transmission: float  # 0..1, how much light goes through
+    textures: tuple[tuple[str, Texture], ...]  # base, normal, roughness, occlusion, emission -> texture
+
+    @property
+    def chart(self) -> Chart:
+        """The chart of its textures: that of the first."""
+        return self.textures[0][1].chart if self.textures else Chart()
+
+
+def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, ...]]:
+    """Return a material of a file, and what of it will not be drawn; for None the one that glTF defines.
+
+    Raises:
+        FaceError: a texture or a sampler is not there.
+    """
+    found = {} if number is None else gltf.item("materials", number)
+    name, more = str(found.get("name", "")), found.get("extensions", {})
+    pbr, glossy = found.get("pbrMetallicRoughness", {}), more.get("KHR_materials_pbrSpecularGlossiness", {})
+    slots = {
+        "base": pbr.get("baseColorTexture") or glossy.get("diffuseTexture"),
+        "normal": found.get("normalTexture"),
+        "roughness": pbr.get("metallicRoughnessTexture"),
+        "occlusion": found.get("occlusionTexture"),
+        "emission": found.get("emissiveTexture"),
+    }
+    notes = [f"{extension} is not drawn" for extension in more if _is_look(extension)]
+    if "KHR_materials_unlit" in more:
+        notes.append("unlit in the file, here light falls on it as on all others")
+    textures: dict[str, Texture] = {}
+    for slot, info in slots.items():
+        texture = _texture(gltf, info, slot) if info else None
+        if texture is None:
+            if info:
+                notes.append(f"the {slot} texture has no picture that is known")
+            continue
+        chart = next((one.chart for one in textures.values()), texture.chart)
+        if _places(texture.chart) == _places(chart):
+            textures[slot] = texture
+        else:
+            notes.append(f"the {slot} texture has other places than the first one and is left out")
+    bright = more.get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
+    material = Material(
+        name,
+        tuple(glossy.get("diffuseFactor") or pbr.get("baseColorFactor", (1, 1, 1, 1))),
+        tuple(bright * factor for factor in found.get("emissiveFactor", (0, 0, 0))),
+        pbr.get("roughnessFactor", 1.0 if "roughness" in textures else None),
+        found.get("alphaMode", "OPAQUE"),
+        found.get("alphaCutoff", 0.5),
+        more.get("KHR_materials_transmission", {}).get("transmissionFactor", 0),
+        tuple(textures.items()),
+    )
+    return material, tuple(notes)
+
+
+def _is_look(extension: str) -> bool:
+    return extension.startswith(("KHR_materials_", "EXT_materials_")) and extension not in DRAWN
+
+
+def _places(chart: Chart) -> tuple[Any, ...]:
+    return chart.name, chart.offset, chart.scale, chart.rotation
+
+
+def _texture(gltf: Gltf, info: dict[str, Any], slot: str) -> Texture | None:
+    found = gltf.item("textures", info["index"])
+    more = found.get("extensions", {})
+    sources = [found, *(more.get(f"EXT_texture_{kind}", {}) for kind in ("webp", "avif"))]
+    sources.append(more.get("KHR_texture_basisu", {}))
+    image = next((one["source"] for one in sources if one.get("source") is not None), None)
+    if image is None:
+        return None
+    sampler = gltf.item("samplers", found["sampler"]) if found.get("sampler") is not None else {}
+    move = info.get("extensions", {}).get("KHR_texture_transform", {})
+    chart = Chart(
+        f"TEXCOORD_{move.get('texCoord', info.get('texCoord', 0))}",
+        tuple(move.get("offset", (0, 0))), tuple(move.get("scale", (1, 1))), move.get("rotation", 0),
+        (sampler.get("wrapS", REPEAT), sampler.get("wrapT", REPEAT)),
+    )  # fmt: skip
+    return Texture(image, chart, info.get({"normal": "scale", "occlusion": "strength"}.get(slot, ""), 1.0))

@@ -1,0 +1,185 @@
+"""Removal of triangle flips from displacement fields."""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from realizer.core.array_types import Bool, Float32, Float64, Int32
+from realizer.face.basis import (
+    BEYOND,
+    FAPS,
+    JAW_COS,
+    JAW_DROP,
+    JAW_SIN,
+    ROWS,
+)
+from realizer.face.coupling import CONTOURS, Contours, contours_of, couple_lips
+from realizer.face.deform import jaw_pose
+from realizer.face.mesh_geometry import triangle_normals
+from realizer.face.model import Fapu
+from realizer.tables import faps
+from realizer_studio.faces.mpeg4.fap_limits import OPEN_JAW, ROLLED, accompanying_faps, required_range
+
+ROUNDS = 60
+PASSES = 6  # repaired neighbours change the limits of a field
+STILL = 1e-4
+SHARE = 0.5  # of the way to the mean of the triangles that turn over, each round
+
+
+# The lips' fields add up to one along a lip, so what softens one of them has to soften all.
+LIPS = frozenset({*range(4, 14), *range(51, 61), 16, 17})
+JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
+
+
+def flipped_triangles(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
+    """Return which triangles (m,) have turned past the angle of this cosine since rest."""
+    before, after = triangle_normals(rest, triangles), triangle_normals(now, triangles)
+    sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+    away: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
+    return away
+
+
+def soften_flips(
+    fields: Float64,
+    at: Float64,
+    triangles: Int32,
+    plays: Sequence[tuple[Float64, Any, float]],
+    fixed: Collection[int],
+) -> Float64:
+    """Return the fields, softened together around the triangles that they flip, until none is flipped.
+
+    Args:
+        fields: (g, n, 3) metres per metre of FAP; at: (n, 3) metres; triangles: (m, 3).
+        plays: (g,) metres (signed) by which the fields are played, each with what moves along then,
+            (n, 3), and the cosine of the turn that counts.
+        fixed: vertices that keep their move.
+    """
+    out = fields.copy()
+    free = np.ones(len(at), bool)
+    free[list(fixed)] = False
+    watched = list(plays)
+    for _ in range(ROUNDS):
+        flipped = [
+            flipped_triangles(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
+            for amounts, along, cosine in watched
+        ]
+        bad = np.any(flipped, axis=0)
+        if not bad.any():
+            if len(watched) == len(plays):
+                break
+            watched = list(plays)
+            continue
+        # What flips nothing is looked at again when nothing else does.
+        watched = [play for play, mine in zip(watched, flipped, strict=True) if mine.any()]
+        # A triangle that moves as one cannot turn over.
+        corners = triangles[bad]
+        count = np.bincount(corners.ravel(), minlength=len(at))
+        loose = np.flatnonzero((count > 0) & free)
+        step = np.empty((len(out), len(loose), 3))
+        for k, field in enumerate(out):
+            pulled = np.zeros_like(at)
+            np.add.at(pulled, corners.ravel(), np.repeat(field[corners].mean(axis=1), 3, axis=0))
+            step[k] = SHARE * (pulled[loose] / count[loose, None] - field[loose])
+        if np.abs(step).max(initial=0.0) < STILL:
+            break  # the remaining flips come from coupled movement
+        out[:, loose] += step
+    return out
+
+
+def without_flips(
+    fields: Mapping[int, Float64],
+    at: Float64,
+    triangles: Int32,
+    points: Mapping[str, int],
+    fapu: Fapu,
+    pivot: Float64,
+    twin: Int32,
+) -> dict[int, Float64]:
+    """Return fields of FAPs that flip no triangle; feature points keep their movement.
+
+    Each is played as far as a face must bear, with the contour of the lips that it drags along or that goes
+    with it, and with all that the action unit asks for that asks most of it.
+
+    Args:
+        fields: row number (`basis`) -> (n, 3); at: (n, 3) metres; triangles: (m, 3).
+        points: feature point -> vertex; pivot: (3,), where the jaw turns.
+        twin: (n,) each vertex's mirror image, or the vertex itself.
+    """
+    out = {number: np.array(field, np.float64) for number, field in fields.items()}
+    contours = contours_of(
+        {name: np.asarray(at[vertex], np.float32) for name, vertex in points.items()}, fapu
+    )
+    chin = at[points["2.1"], 1:] - pivot[1:]
+    fixed = np.zeros(len(at), bool)
+    fixed[list(points.values())] = True
+    for _ in range(PASSES):
+        for asked_by, mended in _groups(out):
+            mine = np.any([np.abs(out[n]).any(axis=1) for n in mended], axis=0)
+            near = triangles[mine[triangles].any(axis=1)]
+            if not len(near):
+                continue
+            here, local = np.unique(near, return_inverse=True)
+            rest = sorted(set(out) - set(mended))
+            fixed_fields = np.stack([out[n][here] for n in rest])
+            plays = []
+            for values, cosine in _played(asked_by, contours):
+                metres = _metres(values, fapu, chin)
+                along = np.tensordot(metres[np.array(rest) - 1], fixed_fields, 1)
+                plays.append((metres[np.array(mended) - 1], along, cosine))
+            soft = soften_flips(
+                np.stack([out[n][here] for n in mended]),
+                at[here], local.reshape(near.shape), plays, np.flatnonzero(fixed[here]).tolist(),
+            )  # fmt: skip
+            for number, field in zip(mended, soft, strict=True):
+                out[number][here] = field
+        out = symmetrize(out, twin)
+    return out
+
+
+def _groups(fields: Mapping[int, Float64]) -> list[tuple[list[int], list[int]]]:
+    """Return FAPs to play, each with the rows to soften together: a FAP and its twin, all lips, the jaw."""
+    table = faps()
+    left = [n for n in sorted(fields) if n <= FAPS and n not in LIPS]
+    pairs = sorted({tuple(sorted({n, table[n - 1].mirror})) for n in left})
+    jaw = [([OPEN_JAW], [n for n in JAW if n in fields])]
+    lips = sorted(LIPS & set(fields))
+    groups = [*jaw, *((list(pair), list(pair)) for pair in pairs), (lips, lips)]
+    return [(requested, mended) for requested, mended in groups if mended]
+
+
+def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, float]]:
+    """Return FAP values (68,) that each of the FAPs must support, with the cosine of the turn that counts."""
+    table, out = faps(), []
+    partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
+    for number in numbers:
+        for sign in (1, -1) if table[number - 1].least < 0 else (1,):
+            requested = np.zeros((3, FAPS), np.float32)
+            requested[:2, number - 1] = sign * required_range(number, sign)
+            requested[1, partner.get(number, number) - 1] = requested[0, number - 1]
+            for fap, value in accompanying_faps(number, sign).items():
+                requested[2, fap - 1] = value
+            alone, paired, accompanied = couple_lips(contours, requested)
+            out += [(alone, 0.0), (paired, 0.0), (accompanied, ROLLED)]
+    return out
+
+
+def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
+    """Return the factors (141,) of the rows for FAP values (68,)."""
+    out = np.zeros(ROWS)
+    out[:FAPS] = values * [fapu.metres(row.unit) for row in faps()]
+    turn, slid = jaw_pose({"chin": chin}, out[OPEN_JAW - 1])
+    out[[JAW_COS, JAW_SIN, JAW_DROP]] = 1 - np.cos(turn), np.sin(turn), slid
+    out[OPEN_JAW - 1] = 0
+    return out
+
+
+def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
+    """Return symmetric fields: each is the mean of itself and its twin's mirror image."""
+    table, flip = faps(), np.array([-1.0, 1.0, 1.0])
+    out = {}
+    for number, field in fields.items():
+        place, fap = divmod(number - 1, BEYOND)
+        mirror, sign = (table[fap].mirror, table[fap].sign) if fap < FAPS else (number, 1)
+        out[number] = (field + sign * fields[place * BEYOND + mirror][twin] * flip) / 2
+    return out

@@ -1,0 +1,115 @@
+"""Places of the skin in the maps: the base mesh's islands, packed so that the face gets most texels."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from realizer.core.array_types import Float64, Int32
+from realizer_studio.faces.parts import Submesh
+from realizer_studio.faces.person.makehuman import BaseMesh
+
+SIZE = 2048  # texels of a side of the maps
+
+
+class Square(NamedTuple):
+    """A region of the maps, in shares of their sides from the top left."""
+
+    left: float
+    top: float
+    right: float
+    bottom: float
+
+    def texels(self, size: int = SIZE) -> tuple[slice, slice]:
+        """Return the rows and columns of the region in a map of that size."""
+        left, top, right, bottom = (round(share * size) for share in self)
+        return slice(top, bottom), slice(left, right)
+
+
+# What triangles without a picture of their own show; the regions of hairs' pictures and of the eyes'.
+NEUTRAL = Square(0, 0, 1 / 128, 1 / 128)
+HAIR = Square(0.875, 0.875, 1, 1)
+EYES = Square(0.75, 0.875, 0.875, 1)
+
+# Islands of the base mesh, in the order of its texture coordinates, and where they go.
+HEAD, MOUTH, BODY, RIGHT_SOCKET, LEFT_SOCKET = 0, 1, 2, 3, 6
+PLACES = {
+    MOUTH: Square(0.655, 0.655, 0.86, 0.80),
+    BODY: Square(0.006, 0.655, 0.64, 0.994),
+    RIGHT_SOCKET: Square(0.875, 0.655, 0.985, 0.75),
+    LEFT_SOCKET: Square(0.875, 0.765, 0.985, 0.86),
+}
+# The island of the head lies on its side. Down the map: texture coordinate u from the scalp's top to below
+# the chin; across: v from the middle line on. The face is stretched, the scalp is not.
+DOWN = np.array([0.641, 0.74, 0.765, 0.93, 0.994]), np.array([0.006, 0.096, 0.130, 0.508, 0.640])
+MIDDLE = 0.4835
+ACROSS = np.array([0, 0.035, 0.11, 0.16, 0.335]), np.array([0, 0.108, 0.277, 0.360, 0.494])
+MOST = 2.2  # times that the body's island is enlarged at most
+
+
+def corners(mesh: BaseMesh, patch: Submesh) -> Float64:
+    """Return the place (m, 3, 2) in the maps of each corner of the triangles of a surface.
+
+    A corner beyond the island that the rest of its triangle is in goes to its nearest vertex there.
+    """
+    from scipy.spatial import cKDTree
+
+    charts, islands = _charts(mesh)
+    rest = patch.mix @ mesh.vertices
+    each = np.stack([patch.mix @ chart for chart in charts])  # (charts, n, 2), NaN where a vertex is not
+    for island in np.unique(islands):
+        mine = islands == island
+        each[mine] = _placed(int(island), each[mine])
+    known = np.isfinite(each[..., 0])
+    best = known[:, patch.triangles].sum(axis=2).argmax(axis=0)
+    for chart in np.unique(best):
+        wanted = np.unique(patch.triangles[best == chart])
+        lacking = wanted[~known[chart, wanted]]
+        if len(lacking):
+            there = np.flatnonzero(known[chart])
+            each[chart, lacking] = each[chart, there[cKDTree(rest[there]).query(rest[lacking])[1]]]
+    return np.asarray(each[best[:, None], patch.triangles])
+
+
+def _charts(mesh: BaseMesh) -> tuple[Float64, Int32]:
+    """Return the texture coordinates (k, n, 2) of base vertices in each chart, NaN elsewhere, and its island.
+
+    The charts are the islands without the vertices that have several places there, at a cut along the middle
+    line; and each of their sides, with those vertices.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
+    quads, corner = mesh.quads["body"], mesh.corners
+    ends = np.concatenate([corner[:, [k, (k + 1) % 4]] for k in range(4)]).T
+    count = len(mesh.texture)
+    links = sp.coo_matrix((np.ones(ends.shape[1]), tuple(ends)), (count, count))
+    island = connected_components(links, directed=False)[1][corner[:, 0]]
+    left = mesh.vertices[quads, 0].mean(axis=1) > 0
+    numbers = np.intersect1d(island, [HEAD, *PLACES])
+    charts = np.full((3, len(numbers), len(mesh.vertices), 2), np.nan)
+    for whole, *sides, number in zip(*charts, numbers, strict=True):
+        for chart, half in zip(sides, (left, ~left), strict=True):
+            mine = half & (island == number)
+            chart[quads[mine].ravel()] = mesh.texture[corner[mine].ravel()]
+        one, other = sides
+        whole[:] = np.where(np.isnan(one), other, one)
+        whole[(np.abs(one - other) > 1e-6).any(axis=1)] = np.nan
+    return charts.reshape(-1, *charts.shape[2:]), np.tile(numbers, 3)
+
+
+def _placed(island: int, texture: Float64) -> Float64:
+    """Return places in the maps of an island's texture coordinates (..., 2)."""
+    u, v = np.moveaxis(texture, -1, 0)
+    if island == HEAD:
+        off = v - MIDDLE
+        return np.stack([0.5 + np.sign(off) * np.interp(np.abs(off), *ACROSS), np.interp(u, *DOWN)], -1)
+    place = PLACES[island]
+    low, high = (np.array([f(u), f(1 - v)]) for f in (np.nanmin, np.nanmax))
+    room = np.array([place.right - place.left, place.bottom - place.top])
+    scale = min(*(room / np.maximum(high - low, 1e-9)), MOST)
+    return np.asarray((np.stack([u, 1 - v], -1) - low) * scale + place[:2])
+
+
+def packed(places: Any) -> Any:
+    """Return places in the maps 0..1 as uint16."""
+    return np.clip(np.rint(np.asarray(places) * 65535), 0, 65535).astype(np.uint16)

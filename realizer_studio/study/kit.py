@@ -1,0 +1,116 @@
+"""The folder of a study, which any browser opens, and the key to its right answers, which lies outside it."""
+
+import hashlib
+import json
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from realizer.core.atomic_files import write_text
+from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item
+
+ITEMS, TEXTS, PAGE = "items.js", "texts.js", "index.html"
+SAVED = 1_000_000_000  # time of all files, in seconds, so that it does not tell in what order they were made
+
+
+def key_of(folder: Path) -> Path:
+    """Return the file beside a study's folder that holds its right answers."""
+    folder = folder.resolve()
+    return folder.with_name(f"{folder.name}.key.json")
+
+
+def texts() -> dict[str, Any]:
+    """Return language -> texts of the page."""
+    content = files(__package__).joinpath("texts.json").read_text("utf-8")
+    return dict(json.loads(content))
+
+
+def check_folder(folder: Path) -> None:
+    """Raise ValueError unless a study can be written there without replacing anything."""
+    parent = folder.resolve().parent
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ValueError(f"{folder}: wanted a new or empty folder, got one with files in it")
+    if key_of(folder).exists():
+        raise ValueError(f"{key_of(folder)}: is the key of an earlier study; move it, or name another DIR")
+    if not (parent.is_dir() and os.access(parent, os.W_OK)):
+        raise ValueError(f"{parent}: wanted a folder that can be written, to make {folder.name} in it")
+
+
+def write_kit(folder: Path, items: Sequence[Item], about: Mapping[str, Any]) -> Path:
+    """Write the folder of a study and its key, or nothing; return the key's path.
+
+    Names of files and items are hashes with a random salt, and items lie in the order of their names, so that
+    the folder does not tell right answers.
+
+    Args:
+        about: `judges`, `language`, and what else the key should tell.
+
+    Raises:
+        ValueError: as `check_folder`.
+        OSError: it cannot be written.
+    """
+    check_folder(folder)
+    salt = secrets.token_hex(16)
+    study = {"study": _name(salt, "study"), "judges": about["judges"], "language": about["language"]}
+    with _new_folder(folder) as draft:
+        shown, truths = [], {}
+        for number, item in enumerate(items):
+            name = _name(salt, str(number))
+            pictures = {role: _save(draft, salt, content) for role, content in item.shown.items()}
+            options = {
+                _save(draft, f"{salt}{number}", content): role for role, content in item.options.items()
+            }
+            one = {"id": name, "kind": item.kind, "shown": pictures, "options": sorted(options)}
+            shown.append(one | {"text": dict(item.text)} | ({"check": item.check} if item.check else {}))
+            truths[name] = {"kind": item.kind, **item.truth, "shown": pictures, "options": options}
+        kinds = [kind for kind in KINDS if any(item.kind == kind for item in items)]
+        content = study | {"kinds": kinds, "answers": ANSWERS, "wheel": WHEEL}
+        content |= {"items": sorted(shown, key=lambda one: str(one["id"]))}
+        _script(draft / ITEMS, "STUDY", content)
+        _script(draft / TEXTS, "TEXTS", texts())
+        page, script = (files(__package__).joinpath(name).read_text("utf-8") for name in (PAGE, "page.js"))
+        (draft / PAGE).write_text(page.replace("/* page.js */", script), "utf-8")
+        for path in [*draft.iterdir(), draft]:
+            os.utime(path, (SAVED, SAVED))
+        key = {**study, **about, "folder": folder.name, "salt": salt, "items": truths}
+        write_text(key_of(folder), json.dumps(key, indent=1) + "\n")
+    return key_of(folder)
+
+
+def _name(salt: str, what: str) -> str:
+    return hashlib.sha256(f"{salt} {what}".encode()).hexdigest()[:12]
+
+
+def _save(folder: Path, salt: str, content: bytes) -> str:
+    suffix = ".webp" if content[8:12] == b"WEBP" else ".webm"
+    name = _name(salt, hashlib.sha256(content).hexdigest()) + suffix
+    (folder / name).write_bytes(content)
+    return name
+
+
+def _script(path: Path, name: str, content: Any) -> None:
+    """Write JSON as a script: a page that is opened as a file may not fetch others."""
+    text = json.dumps(content, ensure_ascii=False, indent=1)
+    path.write_text(f"window.{name} = {text};\n", "utf-8")
+
+
+@contextmanager
+def _new_folder(folder: Path) -> Iterator[Path]:
+    """Yield a folder that gets its name at the end of the block, or is deleted, and the key, if it fails."""
+    draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.resolve().parent))
+    try:
+        yield draft
+        draft.chmod(0o755)
+        if folder.exists():
+            folder.rmdir()
+        draft.replace(folder)
+    except BaseException:
+        key_of(folder).unlink(missing_ok=True)
+        shutil.rmtree(draft, ignore_errors=True)
+        raise

@@ -1,0 +1,88 @@
+"""Tests of `realizer_studio.tracking.markers.film`."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from realizer.animation.fap.fap_reader import read_fap
+from realizer_studio.analysis.faps_from_points import read_points
+from realizer_studio.tracking.markers.colours import named
+from realizer_studio.tracking.markers.film import FORMATS, Look, Markers, faps_of, track_markers
+from realizer_studio.tracking.markers.layout import wojdel
+from realizer_studio.tracking.network import TrackingError
+from tests.painted import acted, hidden, plain, truth
+
+COLOURS = (named("green"), named("blue"))
+
+
+@pytest.fixture(scope="module")
+def tracked() -> Markers:
+    """Markers of ada, who raises the brows and opens the mouth; some are hidden."""
+    gone = hidden(30, 0.02, 1)
+    gone[0] = False
+    return track_markers(plain(truth("ada", acted()), gone), Look(COLOURS), "film")
+
+
+def test_track_markers_finds_them_to_a_pixel(tracked: Markers) -> None:
+    off = np.linalg.norm(tracked.pixels - truth("ada", acted()), axis=2)
+    assert np.median(off) < 0.5
+    assert off.max() < 3
+    assert tracked.layout.names == wojdel().names
+    assert tracked.seen.mean() == pytest.approx(0.98, abs=0.015)
+
+
+def test_faps_of_markers_are_those_of_the_face(tracked: Markers) -> None:
+    values, seen = faps_of(tracked, "ada")
+    shown = acted()
+    assert seen[[30, 31, 51, 2]].all()
+    assert not seen[[15, 16, *range(47, 50)]].any()  # towards the camera, and the head
+    for fap in (31, 32, 3):
+        assert np.corrcoef(values[:, fap - 1], shown[:, fap - 1])[0, 1] > 0.95
+        assert np.ptp(values[:, fap - 1]) == pytest.approx(np.ptp(shown[:, fap - 1]), rel=0.35)
+
+
+def test_formats_have_the_points(tracked: Markers) -> None:
+    moving, _ = read_points(FORMATS[".csv"](tracked, "ada", "x"), names=None)
+    assert moving["20"][:, :2] == pytest.approx(tracked.points[:, 19], abs=1e-4)
+    content = json.loads(FORMATS[".json"](tracked, "ada", "x"))
+    assert np.array(content["pixels"]) == pytest.approx(tracked.pixels, abs=0.01)
+    assert content["feature_points"][19] == "9.3"
+    assert len(read_fap(FORMATS[".fap"](tracked, "ada", "x")).values) == 30
+    assert FORMATS[".bml"](tracked, "ada", "x").startswith("<")
+
+
+def test_track_markers_numbers_any_other_markers() -> None:
+    few = truth("ada", acted(8))[:, [3, 4, 19, 25, 26]]
+    markers = track_markers(plain(few), Look(COLOURS[:1]), "film")
+    assert markers.layout.names == ("1", "2", "3", "4", "5")
+    assert markers.pixels == pytest.approx(few, abs=1)
+    with pytest.raises(TrackingError, match="wanted two feature points of MPEG-4 or more"):
+        faps_of(markers)
+
+
+def test_track_markers_puts_an_uneven_film_on_an_even_rate() -> None:
+    shown = list(plain(truth("ada", acted(10))))
+    late = [shown[k].__class__(k / 25 + (0.01 if k % 2 else 0), shown[k].image, "p") for k in range(10)]
+    markers = track_markers(late, Look(COLOURS, neutral=0), "film", fps=50)
+    assert (markers.fps, len(markers.points)) == (50, 19)
+    assert np.isfinite(markers.points).all()
+
+
+def test_track_markers_says_what_was_found_instead() -> None:
+    with pytest.raises(TrackingError, match=r"film: wanted markers of the colours red, found 0"):
+        track_markers(plain(truth("ada", acted(2))), Look((named("red"),)), "film")
+    grey = [
+        one.__class__(one.time, one.image.convert("L").convert("RGB"), one.name)
+        for one in plain(truth("ada", acted(2)))
+    ]
+    with pytest.raises(
+        TrackingError, match=r"film: wanted markers of the colours green, blue, found 0 in most"
+    ):
+        track_markers(grey, Look(COLOURS), "film")
+    with pytest.raises(TrackingError, match=r"wanted a picture from 0 to 1 as --neutral, got 9"):
+        track_markers(plain(truth("ada", acted(2))), Look(COLOURS, neutral=9), "film")
+    with pytest.raises(TrackingError, match=r"wanted the 31 markers of the layout, found 5"):
+        track_markers(plain(truth("ada", acted(2))[:, :5]), Look(COLOURS, wojdel()), "film")
