@@ -20,7 +20,7 @@ assert IMAGE_EXTRAS is not None
 # File -> its extras.
 LOCKS = {
     "docker/requirements.txt": tuple(IMAGE_EXTRAS[1].split(",")),
-    ".github/requirements.txt": ("all", "test"),
+    ".github/requirements.txt": ("all", "test", "dev"),
 }
 PYTHON, PLATFORM = "3.11", "x86_64-manylinux_2_28"
 HEAD = "# Written by `python -m tests.locks` for Python 3.11 on Linux; extras: {}.\n"
