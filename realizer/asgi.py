@@ -5,13 +5,9 @@ Its settings are REALIZER_* variables, as for `realizer serve`; `create_app(sett
 
 from realizer.core.threads import use_one_thread
 
-use_one_thread()
-try:
-    from realizer.server.http.app import create_app
-except ImportError as error:
-    if error.name is None or error.name.partition(".")[0] != "starlette":
-        raise
-    raise ImportError("realizer.asgi needs the asgi extra: pip install 'bml-realizer[asgi]'") from None
+use_one_thread()  # before numpy is loaded
+
+from realizer.server.http.app import create_app  # noqa: E402
 
 __all__ = ["app", "create_app"]
 

@@ -94,6 +94,8 @@ IMPORTERS = {
     "redis": ("realizer.server.journal.redis_journal",),
     "pocketsphinx": ("realizer.speech.align.sphinx",),
     "starlette": ("realizer.server.http",),
+    "uvicorn": ("realizer.server.http",),
+    "h11": ("realizer.server.http.protocols",),
     "stomp": ("realizer.server.transports.broker",),
     "jwt": ("realizer.server.http.access",),
     "cryptography": ("realizer.server.http.access",),

@@ -15,9 +15,10 @@ from realizer.core.logs import write_json
 from realizer.core.settings import Settings, SettingsError
 from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
+from realizer.server.http.hub import Hub
+from realizer.server.http.server import HttpServer, startup_lines
 from realizer.server.runtime.session_host import SessionHost, disable_automatic_gc
 from realizer.server.transports.transport import Transport, requested
-from realizer.server.transports.websocket.server import WebSocketTransport, startup_lines
 
 # s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the
 # loop pauses every 4 ms (`turns.SLICE`) and takes the lock back at once: with the usual 5 ms threads
@@ -173,10 +174,14 @@ class Server:
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
         self.settings = settings or Settings()
-        self._sessions = SessionHost(self.settings, worker)
-        self._web = WebSocketTransport(self._sessions, self.settings, worker=worker)
+        self._hub = Hub(self.settings, worker)
+        self._web = HttpServer(self._hub)
         self.transports: list[Transport] = []
         self._closed = asyncio.Event()
+
+    @property
+    def _sessions(self) -> SessionHost:
+        return self._hub.sessions
 
     @property
     def port(self) -> int:
@@ -202,7 +207,7 @@ class Server:
             FaceError: there is no such face.
             RealizerError: a transport needs a package that is not installed.
         """
-        await self._sessions.start()
+        await self._hub.ready()
         try:
             others = (make(self._sessions, self.settings) for make in requested(self.settings))
             for transport in (self._web, *others):

@@ -5,33 +5,49 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import logging
 import re
 import shutil
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from functools import partial
 from http import HTTPStatus
-from typing import Any
+from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from starlette.applications import Starlette
 from starlette.background import BackgroundTask
-from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
+from starlette.concurrency import run_in_threadpool
+from starlette.datastructures import MutableHeaders
+from starlette.exceptions import HTTPException
+from starlette.middleware import Middleware
+from starlette.requests import ClientDisconnect, HTTPConnection, Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
-from realizer.server.http.http_site import FRAMES
+from realizer.server.http.connections import SOCKETS, session_of
+from realizer.server.http.http_site import FRAMES, JSON
 from realizer.server.http.hub import Hub, address_of
+from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.http.openapi import FINDING, description
 from realizer.server.http.page_tools import MAX_TEXT
-from realizer.server.http.requests import SOCKETS, session_of
 from realizer.server.http.socket_client import SocketClient
 from realizer.server.runtime.session_registry import JoinError, Visitor
 from realizer.sources import document_of
 
+if TYPE_CHECKING:
+    from realizer.checking.finding import Finding
+
+log = logging.getLogger(__name__)
+
 KEEP_ALIVE = 15.0  # s; proxies close connections in which nothing comes
 MOST_UNREAD = 10_000  # messages; a client that reads no more of its feedback is disconnected
+RETRY = "5"  # s; when one that was refused for want of room may try again
+# Paths whose errors are JSON.
+API = re.compile("/(realize|check|openapi[.]json|sessions(/.*)?)$")
 SEQ = re.compile(r'\bseq="(\d+)"')
 
 
@@ -48,7 +64,11 @@ def create_app(settings: Settings | None = None) -> Starlette:
     Raises:
         SettingsError: they are wrong, or ask for several workers.
     """
-    hub = Hub(settings or Settings.read())
+    return application(Hub(settings or Settings.read()))
+
+
+def application(hub: Hub) -> Starlette:
+    """Return the application of a hub."""
     handlers: tuple[tuple[str, str, Callable[[Hub, Request], Any]], ...] = (
         ("/realize", "POST", _realize),
         ("/check", "POST", _check),
@@ -58,52 +78,105 @@ def create_app(settings: Settings | None = None) -> Starlette:
         ("/sessions/{session}/webrtc/{peer:int}", "DELETE", _disconnect_peer),
         ("/sessions/{session}", "DELETE", _end),
         ("/openapi.json", "GET", _openapi),
-        ("/{path:path}", "GET", _site),
+        ("/healthz", "GET", _health),
+        ("/metrics", "GET", _metrics),
     )
-    routes = [Route(path, _guarded(hub, handler), methods=[method]) for path, method, handler in handlers]
-    # Before the site, which answers GET requests for any path.
-    routes[-1:-1] = [
-        Route(path, _guarded(hub, partial(_refuse_get, method)), methods=["GET"])
-        for path, method, _ in handlers
-        if method != "GET"
-    ]
-    sockets = [WebSocketRoute(path, partial(_socket, hub, path)) for path in SOCKETS]
-    return Starlette(routes=[*sockets, *routes], lifespan=hub.lifespan)
+    routes = [Route(path, partial(handler, hub), methods=[method]) for path, method, handler in handlers]
+    app = Starlette(
+        routes=[WebSocketRoute("/{path:path}", partial(_socket, hub)), *routes],
+        middleware=[Middleware(Guard, hub)],
+        exception_handlers={405: _refuse_method},
+        lifespan=hub.lifespan,
+    )
+    # A route for any path would also answer requests by a wrong method for the paths above.
+    app.router.default = Route("/", partial(_site, hub), methods=["GET"]).handle
+    return app
 
 
-def _guarded(hub: Hub, handler: Callable[[Hub, Request], Any]) -> Callable[[Request], Any]:
-    """Return an endpoint whose refusals are answers, and whose answers pages of allowed origins may read."""
+class Guard:
+    """Middleware that checks the host of a request, answers refusals, and says who may read an answer."""
 
-    async def endpoint(request: Request) -> Response:
+    def __init__(self, app: ASGIApp, hub: Hub) -> None:
+        self._app = app
+        self._hub = hub
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        hub = self._hub
         await hub.ready()
+        connection, path = HTTPConnection(scope), path_of(scope)
+        headers = dict(connection.headers)
+        has_begun = False
+
+        async def send_on(message: Message) -> None:
+            nonlocal has_begun
+            has_begun = True
+            if message["type"].endswith("http.response.start"):
+                answer = MutableHeaders(scope=message)
+                origin = hub.access.origin_of_reader(path, headers)
+                if origin is not None:
+                    answer["Access-Control-Allow-Origin"] = origin
+                answer["Vary"] = "Origin"
+                answer["X-Content-Type-Options"] = "nosniff"
+                answer.setdefault("Content-Security-Policy", FRAMES)
+                if hub.worker is not None:  # the next request may be for a session of another worker
+                    answer["Connection"] = "close"
+                if (status := message["status"]) >= 400:
+                    hub.sessions.metrics.counts["http_errors" if status < 500 else "http_failures"] += 1
+            await send(message)
+
         try:
-            answer: Response = await handler(hub, request)
+            hub.access.check_host(headers)
+            await self._app(scope, receive, send_on)
+        except ClientDisconnect:
+            pass
         except JoinError as error:
-            refused = hub.requests.refuse(error, address_of(request))
-            answer = JSONResponse({"error": str(error)}, refused.status, dict(refused.headers))
-        origin = hub.access.origin_of_reader(f"/{request.path_params.get('path', '')}", dict(request.headers))
-        if origin is not None:
-            answer.headers["Access-Control-Allow-Origin"] = origin
-        answer.headers["Vary"] = "Origin"
-        answer.headers["X-Content-Type-Options"] = "nosniff"
-        answer.headers.setdefault("Content-Security-Policy", FRAMES)
-        return answer
+            await self._refusal(error, connection, path)(scope, receive, send_on)
+        except Exception:
+            if has_begun:
+                raise
+            log.exception("there is no answer to %s %s", scope.get("method", "a WebSocket at"), path)
+            fault = JoinError(HTTPStatus.INTERNAL_SERVER_ERROR, "an error of the service: its log says which")
+            await self._refusal(fault, connection, path)(scope, receive, send_on)
 
-    return endpoint
+    def _refusal(self, error: JoinError, connection: HTTPConnection, path: str) -> Response:
+        self._hub.sessions.metrics.counts["refused"] += 1
+        self._hub.access.log_refusal(error, address_of(connection))
+        headers = {"WWW-Authenticate": "Bearer"} if error.status == HTTPStatus.UNAUTHORIZED else {}
+        if error.retry:
+            headers["Retry-After"] = RETRY
+        if API.match(path) and connection.scope["type"] == "http":
+            return JSONResponse({"error": str(error)}, error.status, headers)
+        return PlainTextResponse(f"{error}\n", error.status, headers)
 
 
-async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
-    await hub.ready()
-    target, address = f"{path}?{socket.url.query}", address_of(socket)
-    try:
-        hub.access.check_host(dict(socket.headers))
-        hub.connections.admit(target, dict(socket.headers), address)
-    except JoinError as error:
-        refused = hub.requests.refuse(error, address)
-        await socket.send_denial_response(
-            Response(refused.body, refused.status, dict(refused.headers), refused.media_type)
-        )
+def path_of(scope: Scope) -> str:
+    """Return the path of a request inside the application, which may be mounted in another one."""
+    path: str = scope["path"]
+    return path.removeprefix(scope.get("root_path", ""))
+
+
+async def _refuse_method(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    assert error.headers is not None
+    allowed = error.headers["Allow"]
+    wanted = " or ".join(sorted(name.strip() for name in allowed.split(",")))
+    words = f"wanted {wanted} {request.url.path}, got {request.method}"
+    if API.match(path_of(request.scope)):
+        return JSONResponse({"error": words}, HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": allowed})
+    return PlainTextResponse(f"{words}\n", HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": allowed})
+
+
+async def _socket(hub: Hub, socket: WebSocket) -> None:
+    path, address = path_of(socket.scope), address_of(socket)
+    if path not in SOCKETS:
+        words = f"wanted a WebSocket at {', '.join(SOCKETS)}, got a WebSocket at {path[:80]}\n"
+        await socket.send_denial_response(PlainTextResponse(words, HTTPStatus.NOT_FOUND))
         return
+    target = f"{path}?{socket.url.query}"
+    hub.connections.admit(target, dict(socket.headers), address)
     await socket.accept()
     client = SocketClient(socket, target, address, hub.settings)
     try:
@@ -113,47 +186,73 @@ async def _socket(hub: Hub, path: str, socket: WebSocket) -> None:
         await client.finish()
 
 
-async def _refuse_get(method: str, hub: Hub, request: Request) -> Response:
-    words = f"wanted {method} {request.url.path}, got {request.method}"
-    return JSONResponse({"error": words}, HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": method})
-
-
 async def _site(hub: Hub, request: Request) -> Response:
-    hub.access.check_host(dict(request.headers))
-    target = f"/{request.path_params['path']}?{request.url.query}"
-    found = await hub.requests.answer(target, dict(request.headers))
-    return Response(found.body, found.status, dict(found.headers), found.media_type)
+    path = path_of(request.scope)
+    if path in SOCKETS:
+        words = f"wanted a WebSocket at {', '.join(SOCKETS)}, got plain HTTP at {path}\n"
+        return PlainTextResponse(words, HTTPStatus.UPGRADE_REQUIRED, {"Upgrade": "websocket"})
+    if not hub.site.is_public(path):
+        hub.grant(request)
+    known = request.headers.get("if-none-match", "")
+    return await run_in_threadpool(hub.site.answer, f"{quote(path)}?{request.url.query}", known)
+
+
+async def _health(hub: Hub, request: Request) -> Response:
+    hub.check_worker(request)
+    return Response(json.dumps({"status": "ok", **hub.sessions.health()}), media_type=JSON)
+
+
+async def _metrics(hub: Hub, request: Request) -> Response:
+    hub.check_worker(request)
+    if hub.grant(request).sessions is not None:
+        raise JoinError(HTTPStatus.FORBIDDEN, "metrics: wanted a token for all sessions")
+    return Response(hub.sessions.metrics_text(), media_type=MEDIA_TYPE)
 
 
 async def _openapi(hub: Hub, request: Request) -> Response:
     return JSONResponse(description(request.scope.get("root_path", "")))
 
 
+@contextlib.contextmanager
+def _faults_of_texts() -> Iterator[None]:
+    """Refuse a text that cannot be spoken because XML cannot hold it."""
+    try:
+        yield
+    except ValueError as error:
+        raise JoinError(HTTPStatus.BAD_REQUEST, f"body: {error}") from None
+
+
 async def _realize(hub: Hub, request: Request) -> Response:
     visitor, query = hub.admit(request), dict(request.query_params)
-    path = await hub.renderings.render(await hub.body(request), query, visitor.address)
+    with _faults_of_texts():
+        document = document_of(await hub.body(request)).bml
+    path = await hub.attend(request, hub.renderings.render(document, query, visitor.address))
     remove = BackgroundTask(shutil.rmtree, path.parent, ignore_errors=True)
     return FileResponse(path, media_type=OUTPUTS[path.suffix].media_type, background=remove)
 
 
 async def _check(hub: Hub, request: Request) -> Response:
+    hub.admit(request)
+    with _faults_of_texts():
+        found = await hub.attend(request, _findings(hub, await hub.body(request, MAX_TEXT)))
+    return JSONResponse([{name: getattr(finding, name) for name in FINDING} for finding in found])
+
+
+async def _findings(hub: Hub, body: bytes) -> Iterable[Finding]:
     from realizer.checking.source import check
 
-    hub.admit(request)
-    body = await hub.body(request, MAX_TEXT)
-    loop = asyncio.get_running_loop()
     # One at a time: sessions come first.
     async with hub.checking:
-        found = await loop.run_in_executor(
-            None, partial(check, body, strict_bml=hub.settings.strict_bml, media=hub.settings.media)
+        return await run_in_threadpool(
+            check, body, strict_bml=hub.settings.strict_bml, media=hub.settings.media
         )
-    return JSONResponse([{name: getattr(finding, name) for name in FINDING} for finding in found])
 
 
 async def _send_bml(hub: Hub, request: Request) -> Response:
     """Submit the documents or the text in the body to a session, which is opened if it is not there."""
     visitor, name = hub.admit(request), request.path_params["session"]
-    document = document_of(await hub.body(request)).bml
+    with _faults_of_texts():
+        document = document_of(await hub.body(request)).bml
     text = document.decode("utf-8", "replace") if isinstance(document, bytes) else document
     async with hub.joined(_Listener(), name, visitor) as number:
         hub.sessions.receive(number, text)
@@ -207,7 +306,6 @@ async def _connect_peer(hub: Hub, request: Request) -> Response:
     peers.check_room()
     offer, is_json = offer_of(await hub.body(request, MAX_TEXT))
     async with contextlib.AsyncExitStack() as entered:
-        entered.enter_context(hub.connections.place(visitor.address))
         peer = Peer(name, grant.seconds_left)
         peer.number = await entered.enter_async_context(hub.joined(peer, name, visitor))
         sdp = await peers.answer(offer, dict(request.query_params), peer, entered)

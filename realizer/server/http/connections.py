@@ -6,47 +6,25 @@ import http
 import logging
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
-from typing import Protocol
+from urllib.parse import parse_qsl
 
 from realizer.core.settings import Settings, limit_hint
+from realizer.core.similar import did_you_mean, similar
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
 from realizer.server.editors import EDITORS, editor_of
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, Grant
-from realizer.server.http.requests import path_of, session_of
+from realizer.server.http.socket_client import SocketClient
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError, Visitor
-from realizer.server.transports.transport import Outbound
 
 log = logging.getLogger(__name__)
 
 # Status of a refusal that another try does not mend -> code of the error about it.
 REFUSALS: Mapping[int, ErrorCode] = {400: "invalid", 401: "token", 403: "token"}
-
-
-class ClientSocket(Outbound, Protocol):
-    """The WebSocket of a client."""
-
-    address: str
-    target: str
-    headers: Mapping[str, str]  # of its request, by lower-case names
-
-    @property
-    def close_code(self) -> int | None:
-        """The code with which it was closed."""
-
-    def on_rate(self, warn: Callable[[str], None]) -> None:
-        """Call `warn` with a notice when the client sends too fast."""
-
-    async def receive(self) -> str | bytes | None:
-        """Return the next message; None after the last."""
-
-    async def send_all(self, text: str | bytes) -> None:
-        """Send a message, and wait until the network has taken it, or the connection has ended."""
-
-    async def close(self, code: int, reason: str) -> None:
-        """Close the connection and wait until it is closed."""
+PARAMETERS = frozenset({"session", "seen", "token"})  # of a WebSocket's address; others are ignored
+SOCKETS = ("/ws", "/check", *(f"/{name}" for name in EDITORS))  # paths of WebSockets
 
 
 class WebSocketConnections:
@@ -56,12 +34,13 @@ class WebSocketConnections:
         self._sessions = sessions
         self._settings = settings
         self._access = access
-        self._work: dict[str, Callable[[ClientSocket], Awaitable[None]]] = {
+        self._work: dict[str, Callable[[SocketClient], Awaitable[None]]] = {
             "/check": self._check,
             **{f"/{name}": partial(self._edit, name, asyncio.Lock()) for name in EDITORS},
         }
         self._checking = asyncio.Lock()
         self._from: list[str] = []  # the addresses of the open connections
+        self._clients: set[SocketClient] = set()
 
     def admit(self, target: str, headers: Mapping[str, str], address: str) -> None:
         """Check whether a WebSocket may be opened at one of `SOCKETS`.
@@ -71,7 +50,7 @@ class WebSocketConnections:
         Raises:
             JoinError: the client may not open it.
         """
-        works = path_of(target) in self._work
+        works = target.partition("?")[0] in self._work
         if not works and "origin" in headers and self._access.allows_origin(headers):
             self._check_room(address)
             return
@@ -104,16 +83,23 @@ class WebSocketConnections:
             words = f"{most} connections from {address} are open: wanted fewer"
             raise JoinError(http.HTTPStatus.TOO_MANY_REQUESTS, f"{words} {limit_hint('max_connections')}")
 
-    async def serve(self, client: ClientSocket) -> None:
+    async def serve(self, client: SocketClient) -> None:
         """Serve one WebSocket until it closes."""
-        serve = self._work.get(path_of(client.target), self._serve)
+        serve = self._work.get(client.target.partition("?")[0], self._serve)
         try:
             with self.place(client.address):  # others may have connected since the HTTP request
+                self._clients.add(client)
                 await serve(client)
         except JoinError as error:
             await client.close(1013, str(error))
+        finally:
+            self._clients.discard(client)
 
-    async def _serve(self, client: ClientSocket) -> None:
+    async def close(self, code: int, reason: str) -> None:
+        """Close all WebSockets."""
+        await asyncio.gather(*(client.close(code, reason) for client in self._clients))
+
+    async def _serve(self, client: SocketClient) -> None:
         hello = None
         try:
             grant = self._access.request(client.target, client.headers, later=True)
@@ -144,7 +130,7 @@ class WebSocketConnections:
             self._sessions.leave(number)
             log.info("left", extra={**fields, "code": client.close_code})
 
-    async def _read(self, client: ClientSocket, number: int) -> None:
+    async def _read(self, client: SocketClient, number: int) -> None:
         """Pass on messages, whose rate the client's socket limits."""
         client.on_rate(lambda notice: client.send(ErrorMessage(code="rate", message=notice).text()))
         while (message := await client.receive()) is not None:
@@ -153,7 +139,7 @@ class WebSocketConnections:
             await asyncio.sleep(0)  # one read may hold many messages
             await self._sessions.wait_for_room(number)
 
-    async def _first_message(self, client: ClientSocket) -> tuple[str | bytes, Grant]:
+    async def _first_message(self, client: SocketClient) -> tuple[str | bytes, Grant]:
         """Return the first message of a client without a token, and the grant of the token in it.
 
         Raises:
@@ -165,7 +151,7 @@ class WebSocketConnections:
                 message = await client.receive() or ""
         return message, self._access.check_hello(message)
 
-    async def _reject(self, client: ClientSocket, error: JoinError) -> None:
+    async def _reject(self, client: SocketClient, error: JoinError) -> None:
         self._sessions.metrics.counts["refused"] += 1
         self._access.log_refusal(error, client.address)
         code = REFUSALS.get(error.status)
@@ -175,7 +161,7 @@ class WebSocketConnections:
             await client.send_all(message.text())
         await client.close(1013 if code is None else 1008, str(error))
 
-    async def _check(self, client: ClientSocket) -> None:
+    async def _check(self, client: SocketClient) -> None:
         """Serve the WebSocket of a text: answer each version that arrives by its faults."""
         from realizer.server.http.page_tools import lint
 
@@ -189,7 +175,7 @@ class WebSocketConnections:
                 found = await loop.run_in_executor(None, lint, text, self._settings)
             await client.send_all(found)
 
-    async def _edit(self, name: str, turn: asyncio.Lock, client: ClientSocket) -> None:
+    async def _edit(self, name: str, turn: asyncio.Lock, client: SocketClient) -> None:
         """Serve the WebSocket of an editor: answer the messages of a page in their order."""
         grant = self._access.request(client.target, client.headers)
         may_save = grant is not None and grant.sessions is None
@@ -203,3 +189,22 @@ class WebSocketConnections:
                 await client.send_all(answer)
         finally:
             await loop.run_in_executor(None, editor.close)
+
+
+def session_of(target: str) -> tuple[str | None, int | None]:
+    """Return the session and the number in `?session=ID&seen=N`.
+
+    Raises:
+        JoinError: 400, `seen` is not a number, or a parameter is a misspelt one.
+    """
+    # Of several values with one name the last.
+    query = dict(parse_qsl(target.partition("?")[2], keep_blank_values=True))
+    for name in sorted(query.keys() - PARAMETERS)[:8]:
+        if near := did_you_mean(similar(name, PARAMETERS, most=1, cutoff=0.7)):
+            raise JoinError(400, f"the address has an unknown parameter {name[:80]!r}{near}")
+    session, seen = query.get("session") or None, query.get("seen")
+    if seen is None:
+        return session, None
+    if not (seen.isascii() and seen.isdigit() and len(seen) < 16):
+        raise JoinError(400, f"seen: wanted the number of the last feedback that came, got {seen[:80]!r}")
+    return session, int(seen)

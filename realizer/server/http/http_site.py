@@ -1,4 +1,4 @@
-"""The HTTP site on the service's port: page, tools, faces as GLB, health."""
+"""The HTTP site on the service's port: page, tools, faces as GLB."""
 
 import functools
 import hashlib
@@ -7,12 +7,12 @@ import logging
 import mimetypes
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
 from urllib.parse import parse_qs
 
 import numpy as np
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
 
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
@@ -24,7 +24,6 @@ log = logging.getLogger(__name__)
 JSON = "application/json; charset=utf-8"
 GLB = "model/gltf-binary"
 BYTES = "application/octet-stream"
-TEXT = "text/plain; charset=utf-8"
 NOT_BUILT = """The page was not bundled when this package was built.
 Build it where npm is on the PATH: pip install -e . in the checkout, or install a wheel.
 The WebSocket at /ws works without it.
@@ -44,49 +43,38 @@ DOCUMENTATION_POLICY = (
 NO_DOCUMENTATION = """The documentation has not been built.
 Build it in a checkout: pip install -e '.[docs]' && python -m mkdocs build
 """
+REVALIDATED = {"Cache-Control": "no-cache"}
 NAME = re.compile(r"[a-z0-9_-]{1,64}")  # in a URL
-
-
-@dataclass(frozen=True)
-class HttpResponse:
-    """An HTTP response."""
-
-    status: int
-    media_type: str
-    body: bytes
-    headers: tuple[tuple[str, str], ...] = ()
 
 
 class HttpSite:
     """The answers to GET requests.
 
     Args:
-        health: returns what `/healthz` reports beside the status.
         settings: of the service; the page begins with its light and background.
     """
 
-    def __init__(self, health: Callable[[], dict[str, object]], settings: Settings | None = None) -> None:
+    def __init__(self, settings: Settings | None = None) -> None:
         self._settings = settings or Settings()
         self._static = files("realizer.server").joinpath("static")
         self._documentation = files("realizer.server").joinpath("docs")
-        self._routes: dict[str, Callable[[dict[str, str]], HttpResponse]] = {
+        self._routes: dict[str, Callable[[dict[str, str]], Response]] = {
             "/": lambda asked: self._file("index.html"),
-            "/healthz": lambda asked: _json(json.dumps({"status": "ok", **health()})),
             "/asyncapi.json": lambda asked: _json(asyncapi()),
             "/examples.json": lambda asked: _json(_examples()),
             "/vocabulary.json": lambda asked: _json(vocabulary()),
             "/feeling.json": lambda asked: _json(preview_emotion(asked.get("of", ""))),
             "/look.json": self._look,
-            "/mirror": lambda asked: HttpResponse(200, BYTES, _mirror(asked.get("light", ""))),
+            "/mirror": lambda asked: Response(_mirror(asked.get("light", "")), media_type=BYTES),
             "/background": self._background,
             "/pose.fap": self._pose,
         }
 
     def is_public(self, path: str) -> bool:
-        """Return whether anybody may get what is at a path: page, documentation, health."""
-        return path in ("/", "/healthz", "/docs") or path.startswith("/docs/") or path[1:] in self._names
+        """Return whether anybody may get what is at a path: page, documentation."""
+        return path in ("/", "/docs") or path.startswith("/docs/") or path[1:] in self._names
 
-    def answer(self, target: str, known: str = "") -> HttpResponse:
+    def answer(self, target: str, known: str = "") -> Response:
         """Return the response to `GET target`. May block while a face is loaded for the first time.
 
         Args:
@@ -101,15 +89,15 @@ class HttpSite:
                 return self._document(path.removeprefix("/docs").removeprefix("/"))
             if path.startswith("/faces/"):
                 glb, tag = _glb(_face(path.removeprefix("/faces/").removesuffix(".glb")))
-                headers = (("Cache-Control", "no-cache"), ("ETag", tag))
+                headers = {**REVALIDATED, "ETag": tag}
                 if tag in known:
-                    return HttpResponse(304, GLB, b"", headers)
-                return HttpResponse(200, GLB, glb, headers)
+                    return Response(status_code=304, headers=headers)
+                return Response(glb, headers=headers, media_type=GLB)
         except ToolError as error:
-            return HttpResponse(error.status, TEXT, f"{error}\n".encode())
+            return PlainTextResponse(f"{error}\n", error.status)
         except (RealizerError, OSError):
             log.exception("there is no answer to GET %s", path)
-            return HttpResponse(500, TEXT, b"an error of the service: its log says which\n")
+            return PlainTextResponse("an error of the service: its log says which\n", 500)
         return self._file(path[1:])
 
     @functools.cached_property
@@ -118,23 +106,23 @@ class HttpSite:
         found = self._static.iterdir() if self._static.is_dir() else ()
         return frozenset(f.name for f in found if not f.name.startswith("."))
 
-    def _look(self, asked: dict[str, str]) -> HttpResponse:
+    def _look(self, asked: dict[str, str]) -> Response:
         face = _face(asked.get("face", "default"))
         return _json(_look(face, self._settings.light, self._settings.background))
 
-    def _background(self, asked: dict[str, str]) -> HttpResponse:
+    def _background(self, asked: dict[str, str]) -> Response:
         from realizer.render.backdrop import is_picture
 
         path = self._settings.background
         if path is None or not is_picture(path):
             return self._file("background")
-        return HttpResponse(200, _media_type(path), Path(path).read_bytes(), (("Cache-Control", "no-cache"),))
+        return Response(Path(path).read_bytes(), 200, REVALIDATED, _media_type(path))
 
-    def _pose(self, asked: dict[str, str]) -> HttpResponse:
+    def _pose(self, asked: dict[str, str]) -> Response:
         face = asked.get("face")
         pose = export_pose(asked.get("set", ""), None if face is None else _face(face), self._settings)
-        headers = (("Content-Disposition", 'attachment; filename="pose.fap"'),)
-        return HttpResponse(200, "text/x-fap", pose.encode(), headers)
+        headers = {"Content-Disposition": 'attachment; filename="pose.fap"'}
+        return Response(pose, headers=headers, media_type="text/x-fap")
 
     @functools.cached_property
     def _documents(self) -> frozenset[str]:
@@ -142,31 +130,31 @@ class HttpSite:
         with as_file(self._documentation) as folder:
             return frozenset(f.relative_to(folder).as_posix() for f in folder.rglob("*") if f.is_file())
 
-    def _document(self, name: str) -> HttpResponse:
+    def _document(self, name: str) -> Response:
         if not self._documents:
-            return HttpResponse(404, TEXT, NO_DOCUMENTATION.encode())
+            return PlainTextResponse(NO_DOCUMENTATION, 404)
         if not name:
             # Links of a page are relative to its folder, which is /docs/.
-            return HttpResponse(302, TEXT, b"", (("Location", "/docs/index.html"),))
+            return RedirectResponse("/docs/index.html", 302)
         if name not in self._documents:
             return _missing(f"docs/{name}")
         body = self._documentation.joinpath(name).read_bytes()
-        headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", DOCUMENTATION_POLICY))
-        return HttpResponse(200, _media_type(name), body, headers)
+        headers = {**REVALIDATED, "Content-Security-Policy": DOCUMENTATION_POLICY}
+        return Response(body, headers=headers, media_type=_media_type(name))
 
-    def _file(self, name: str) -> HttpResponse:
+    def _file(self, name: str) -> Response:
         """Return a file of the page. Only names in its folder are accepted, so that no path can leave it."""
         if name in self._names and (file := self._static.joinpath(name)).is_file():
-            headers = (("Cache-Control", "no-cache"), ("Content-Security-Policy", POLICY))
-            return HttpResponse(200, _media_type(name), file.read_bytes(), headers)
+            headers = {**REVALIDATED, "Content-Security-Policy": POLICY}
+            return Response(file.read_bytes(), headers=headers, media_type=_media_type(name))
         if name == "index.html":
-            return HttpResponse(503, TEXT, NOT_BUILT.encode())
+            return PlainTextResponse(NOT_BUILT, 503)
         return _missing(name)
 
 
-def _missing(name: str) -> HttpResponse:
+def _missing(name: str) -> Response:
     words = f"/{name[:80]} is not here; there are / /ws /faces/NAME /healthz\n"
-    return HttpResponse(404, TEXT, words.encode())
+    return PlainTextResponse(words, 404)
 
 
 def _media_type(name: str) -> str:
@@ -176,8 +164,8 @@ def _media_type(name: str) -> str:
     return media_type
 
 
-def _json(text: str | bytes) -> HttpResponse:
-    return HttpResponse(200, JSON, text.encode() if isinstance(text, str) else text)
+def _json(text: str | bytes) -> Response:
+    return Response(text, media_type=JSON)
 
 
 def _face(name: str) -> str:

@@ -1,8 +1,8 @@
 """The description of the HTTP interface in OpenAPI 3.1."""
 
+from importlib.metadata import version
 from typing import Any
 
-import realizer
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.http.renderings import OPTIONS
 
@@ -50,7 +50,7 @@ def description(prefix: str = "") -> dict[str, Any]:
         "openapi": "3.1.0",
         "info": {
             "title": "BML realizer",
-            "version": realizer.__version__,
+            "version": version("bml-realizer"),
             "description": "Send BML, get a talking face. Frames, sound and control messages go over the "
             "WebSocket at /ws, which /asyncapi.json describes.",
         },

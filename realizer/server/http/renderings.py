@@ -14,7 +14,6 @@ from pathlib import Path
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.runtime.session_registry import JoinError
-from realizer.sources import document_of
 
 AT_ONCE = 2
 MOST_WAITING = 8  # of one address
@@ -54,8 +53,8 @@ class Renderings:
         self._locks: dict[str, asyncio.Lock] = {}
         self._waiting: Counter[str] = Counter()
 
-    async def render(self, body: bytes, query: Mapping[str, str], address: str) -> Path:
-        """Return the file made of a document or a text; its folder is the caller's to remove.
+    async def render(self, document: str | bytes, query: Mapping[str, str], address: str) -> Path:
+        """Return the file made of a document; its folder is the caller's to remove.
 
         Args:
             query: `format`, a name of `realizer outputs`, and the names of OPTIONS.
@@ -71,7 +70,6 @@ class Renderings:
         folder = Path(tempfile.mkdtemp(prefix="realizer-"))
         try:
             async with self._locks.setdefault(address, asyncio.Lock()), self._slots:
-                document = document_of(body).bml
                 sent = document.encode() if isinstance(document, str) else document
                 return await _run(sent, [*options, "-o", str(folder / f"face{suffix}")], folder)
         except BaseException:
@@ -123,7 +121,7 @@ async def _run(body: bytes, options: list[str], folder: Path) -> Path:
             await process.wait()
     if process.returncode:
         status = STATUS.get(process.returncode, HTTPStatus.INTERNAL_SERVER_ERROR)
-        raise JoinError(status, fault_of(said.decode("utf-8", "replace"), folder))
+        raise JoinError(status, fault_of(said.decode("utf-8", "replace"), folder), retry=False)
     return Path(options[-1])
 
 

@@ -32,11 +32,17 @@ def worker_of(session: str, workers: int, settings: Settings) -> int:
 
 
 class JoinError(RealizerError):
-    """A connection that is refused; `status` is the HTTP status of the answer."""
+    """A connection or a request that is refused.
 
-    def __init__(self, status: int, text: str) -> None:
+    Args:
+        status: HTTP status of the answer.
+        retry: whether another try later may succeed, of one that is refused for want of room.
+    """
+
+    def __init__(self, status: int, text: str, *, retry: bool = True) -> None:
         super().__init__(text)
         self.status = status
+        self.retry = retry and status in (429, 503)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,19 +11,21 @@ import contextlib
 import itertools
 import logging
 import multiprocessing
+import re
 import signal
 import socket
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
 from typing import Any
-from urllib.parse import parse_qs
+from urllib.parse import parse_qs, unquote
 
 from realizer.core.errors import RealizerError
 from realizer.core.logs import write_words
 from realizer.core.settings import Settings
 from realizer.server.runtime.session_registry import worker_of
 from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_workers
+from realizer.server.transports.tcp_listener import listen
 from realizer.server.transports.transport import TRANSPORTS
 
 log = logging.getLogger(__name__)
@@ -32,6 +34,7 @@ log = logging.getLogger(__name__)
 PATIENCE, LONGEST = 10.0, 8192  # s, bytes
 GRACE = 5.0  # s; a worker that has not ended so long after its drain is killed
 STEP = 0.005  # s; between attempts to pass a socket to a busy worker, or to read an incomplete line
+SESSION_PATH = re.compile("/sessions/([^/]+)")
 # The first byte from a worker: its transports are open, or an error text follows.
 READY, FAULT = b"r", b"!"
 
@@ -64,16 +67,7 @@ class Workers:
             OSError: the address is not available.
             RealizerError: a worker cannot start.
         """
-        loop = asyncio.get_running_loop()
-        addresses = await loop.getaddrinfo(
-            self._settings.host or None, self.port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )
-        for family, _, _, _, address in dict.fromkeys(addresses):
-            if self._sockets and self.port == 0:
-                address = (address[0], self._sockets[0].getsockname()[1], *address[2:])
-            listener = socket.create_server(address[:2], family=family, backlog=1024)
-            listener.setblocking(False)
-            self._sockets.append(listener)
+        self._sockets = await listen(self._settings.host, self.port)
         self.port = self._sockets[0].getsockname()[1]
         try:
             for number in range(self._settings.workers):
@@ -181,9 +175,12 @@ class Workers:
 
     def _number(self, line: str) -> int:
         """Return the worker of a request: of its session, the one it names (`?worker=1`), or the next one."""
-        query, count = parse_qs(line.partition("?")[2].partition(" ")[0]), len(self._children)
-        if "session" in query:
-            return worker_of(query["session"][-1], count, self._settings)
+        path, _, query_text = line.partition(" ")[2].partition(" ")[0].partition("?")
+        query, count = parse_qs(query_text), len(self._children)
+        in_path = SESSION_PATH.match(path)
+        session = unquote(in_path[1]) if in_path else query.get("session", [None])[-1]
+        if session is not None:
+            return worker_of(session, count, self._settings)
         named = query.get("worker", [""])[-1]
         if named in map(str, range(count)):
             return int(named)

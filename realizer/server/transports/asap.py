@@ -20,8 +20,8 @@ from realizer.core.settings import Settings
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.document_framing import DocumentFramer, Fault
+from realizer.server.transports.rate_limiter import RateLimiter
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
-from realizer.server.transports.websocket.protocol import RateLimiter
 
 log = logging.getLogger(__name__)
 

@@ -23,9 +23,9 @@ from realizer.server.transports.message_formats import (
     Message,
     MessageFormat,
 )
+from realizer.server.transports.rate_limiter import RateLimiter
 from realizer.server.transports.reconnecting import ReconnectingTransport
 from realizer.server.transports.vhmsg import Vhmsg
-from realizer.server.transports.websocket.protocol import RateLimiter
 
 log = logging.getLogger(__name__)
 

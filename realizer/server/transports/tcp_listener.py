@@ -13,6 +13,7 @@ from realizer.core.settings import is_loopback, limit_hint
 log = logging.getLogger(__name__)
 
 LONGEST_NAME = 64  # characters of a session's name
+BACKLOG = 1024  # connections that wait until they are accepted
 
 
 def session_name(transport: str, host: str) -> str:
@@ -101,3 +102,26 @@ class TcpTransport(ABC):
             writer.transport.abort()
             self._from.remove(host)
             del self._clients[task]
+
+
+async def listen(host: str, port: int) -> list[socket.socket]:
+    """Return sockets that listen at all addresses of a host, on one port.
+
+    Raises:
+        OSError: an address is not available.
+    """
+    addresses = await asyncio.get_running_loop().getaddrinfo(
+        host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
+    )
+    sockets: list[socket.socket] = []
+    try:
+        for family, _, _, _, address in dict.fromkeys(addresses):
+            there = (address[0], sockets[0].getsockname()[1] if sockets else port)
+            listener = socket.create_server(there, family=family, backlog=BACKLOG)
+            listener.setblocking(False)
+            sockets.append(listener)
+    except OSError:
+        for listener in sockets:
+            listener.close()
+        raise
+    return sockets

@@ -377,7 +377,7 @@ def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
 def test_chaos_clients_without_a_complete_request_delay_nobody(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("realizer.server.transports.websocket.server.OPENING", 3600.0)
+    monkeypatch.setattr("realizer.server.http.protocols.OPENING", 3600.0)
 
     async def test(server: Server) -> None:
         silent = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(100)]

@@ -11,8 +11,8 @@ from realizer.core.settings import Settings
 from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.transports.message_formats import Disconnect, Inbound
+from realizer.server.transports.rate_limiter import RateLimiter
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
-from realizer.server.transports.websocket.protocol import RateLimiter
 from realizer.server.transports.xface.attachments import Attachment, prepare
 from realizer.server.transports.xface.tasks import ERROR, Answer, TaskRunner
 from realizer.server.transports.xface.wire import Fault, Status, Task, TaskReader, pack_note

@@ -1,7 +1,8 @@
-"""An application under uvicorn, in a thread of its own."""
+"""The application in a thread of its own: under uvicorn, or as `realizer serve` runs it."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import json
 import threading
@@ -11,8 +12,11 @@ from urllib.error import HTTPError
 from urllib.request import Request, urlopen
 
 import pytest
+import uvicorn
 
-uvicorn = pytest.importorskip("uvicorn", reason="needs the asgi extra")
+from realizer.core.settings import Settings
+from realizer.server.http.app import create_app
+from realizer.server.serve import Server
 
 LIMIT = 30.0  # s
 
@@ -65,3 +69,32 @@ def serve() -> Callable[[Any], contextlib.AbstractContextManager[Served]]:
         assert not thread.is_alive()
 
     return served
+
+
+@contextlib.contextmanager
+def run_service(settings: Settings) -> Iterator[Served]:
+    started, servers, loop = threading.Event(), [], asyncio.new_event_loop()
+
+    async def run() -> None:
+        async with Server(settings) as server:
+            servers.append(server)
+            started.set()
+            await ending.wait()
+
+    ending = asyncio.Event()
+    thread = threading.Thread(target=lambda: loop.run_until_complete(run()))
+    thread.start()
+    assert started.wait(LIMIT)
+    yield Served(servers[0].port)
+    loop.call_soon_threadsafe(ending.set)
+    thread.join(LIMIT)
+    assert not thread.is_alive()
+    loop.close()
+
+
+@pytest.fixture(scope="module", params=["uvicorn", "serve"])
+def open_service(request, serve) -> Callable[..., contextlib.AbstractContextManager[Served]]:
+    """Return a function that serves the application with some settings."""
+    if request.param == "serve":
+        return lambda **settings: run_service(Settings(port=0, voice="silent", **settings))
+    return lambda **settings: serve(create_app(Settings(voice="silent", **settings)))

@@ -10,22 +10,20 @@ from functools import partial
 from urllib.parse import urlsplit
 
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-pytest.importorskip("starlette", reason="needs the asgi extra")
-
-from realizer.core.settings import Settings
 from realizer.server.http.access import LEEWAY
-from realizer.server.http.app import create_app, event_of
+from realizer.server.http.app import event_of
+from realizer.server.runtime.session_registry import JoinError
 from tests.realizer.server.http.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
 
 
 @pytest.fixture(scope="module")
-def app(serve) -> Iterator[Served]:
-    with serve(create_app(Settings(voice="silent"))) as served:
+def app(open_service) -> Iterator[Served]:
+    with open_service() as served:
         yield served
 
 
@@ -121,9 +119,61 @@ def test_app_refuses_bad_names_and_other_origins(app) -> None:
     assert app("PUT", "/check", NOD)[0] == 405
 
 
-def test_app_ends_a_stream_of_feedback_when_its_token_expires(serve) -> None:
+def test_app_answers_a_wrong_method_in_words(app) -> None:
+    assert app.error("PUT", "/check", NOD) == (405, "wanted POST /check, got PUT")
+    for path in ("/", "/nothing", "/healthz"):
+        status, headers, body = app("POST", path, NOD)
+        assert (status, body) == (405, f"wanted GET or HEAD {path}, got POST\n".encode())
+        assert set(headers["allow"].split(", ")) == {"GET", "HEAD"}
+
+
+def test_app_says_where_there_is_a_websocket(app) -> None:
+    status, headers, body = app("GET", "/ws?session=a")
+    assert (status, headers["upgrade"]) == (426, "websocket")
+    assert body.startswith(b"wanted a WebSocket at /ws, /check, ")
+    assert body.endswith(b", got plain HTTP at /ws\n")
+    with pytest.raises(InvalidStatus) as refused:
+        connect(app.url.replace("http", "ws") + "/nothing", open_timeout=LIMIT)
+    assert refused.value.response.status_code == 404
+    assert b"got a WebSocket at /nothing" in refused.value.response.body
+
+
+@pytest.mark.parametrize("path", ["/check", "/realize", "/sessions/s/bml"])
+@pytest.mark.parametrize("sign", ["\0", "\x1b", "\ufffe"])
+def test_app_refuses_a_text_with_signs_that_xml_cannot_hold(app, path, sign) -> None:
+    status, words = app.error("POST", path, f"Hello{sign}there")
+    assert (status, words) == (400, f"body: wanted characters XML can hold, got U+{ord(sign):04X} at 5")
+
+
+def test_app_says_in_words_that_it_has_a_fault(app, monkeypatch, caplog) -> None:
+    monkeypatch.setattr("realizer.server.http.app.document_of", None)
+    assert app.error("POST", "/realize", NOD) == (500, "an error of the service: its log says which")
+    assert "there is no answer to POST /realize" in caplog.text
+    assert b"realizer_http_failures_total 1" in app("GET", "/metrics")[2]
+
+
+def test_app_says_when_to_try_again(app, monkeypatch) -> None:
+    for status, retry in ((503, True), (429, True), (503, False), (400, True)):
+
+        def refuse(*_: object, code: int = status, again: bool = retry) -> None:
+            raise JoinError(code, "no", retry=again)
+
+        monkeypatch.setattr("realizer.server.http.app.document_of", refuse)
+        got, headers, _ = app("POST", "/realize", NOD)
+        assert (got, "retry-after" in headers) == (status, retry and status != 400)
+
+
+def test_app_limits_the_connections_of_an_address(open_service) -> None:
+    with open_service(max_connections=1) as app, connect(app.url.replace("http", "ws") + "/ws"):
+        for method, path in (("POST", "/sessions/s/bml"), ("GET", "/sessions/s/feedback")):
+            status, headers, body = app(method, path, NOD if method == "POST" else b"")
+            assert (status, headers["retry-after"]) == (429, "5")
+            assert b"1 connections from 127.0.0.1 are open: wanted fewer" in body
+
+
+def test_app_ends_a_stream_of_feedback_when_its_token_expires(open_service) -> None:
     jwt = pytest.importorskip("jwt")
-    with serve(create_app(Settings(voice="silent", jwt_key="secret" * 6))) as app:
+    with open_service(jwt_key="secret" * 6) as app:
         token = jwt.encode({"exp": time.time() - LEEWAY + 1.0}, "secret" * 6, "HS256")
         assert list(events(app, "s", Authorization=f"Bearer {token}")) == []
 

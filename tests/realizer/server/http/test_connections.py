@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import logging
+import re
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,9 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
 
 from realizer.core.settings import Settings
+from realizer.server.http.connections import session_of
 from realizer.server.journal import JournalError
+from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
 
 LIMIT = 30  # s
@@ -73,3 +76,33 @@ def test_connection_logs_its_begin_and_end(caplog: pytest.LogCaptureFixture) -> 
     assert (joined.message, left.message) == ("joined", "left")
     assert (joined.session, joined.address) == ("show", "127.0.0.1")  # type: ignore[attr-defined]
     assert (left.session, left.code) == ("show", 1000)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("query", "session", "seen"),
+    [
+        ("", None, None),
+        ("?session=show", "show", None),
+        ("?session=show&seen=0", "show", 0),
+        ("?session=a&session=b&seen=1&seen=12", "b", 12),
+        ("?session=", None, None),
+        ("?token=x&session=a%20b", "a b", None),
+    ],
+)
+def test_session_of_reads_the_address(query: str, session: str | None, seen: int | None) -> None:
+    assert session_of(f"/ws{query}") == (session, seen)
+
+
+@pytest.mark.parametrize("seen", ["", "abc", "-1", "1.5", "9" * 16])
+def test_session_of_refuses_a_bad_number_in_seen(seen: str) -> None:
+    with pytest.raises(JoinError, match="seen: wanted the number of the last feedback that came") as refused:
+        session_of(f"/ws?session=show&seen={seen}")
+    assert refused.value.status == 400
+
+
+def test_session_of_refuses_a_misspelt_parameter() -> None:
+    text = "the address has an unknown parameter 'seesion', did you mean session?"
+    with pytest.raises(JoinError, match=re.escape(text)) as refused:
+        session_of("/ws?seesion=show")
+    assert refused.value.status == 400
+    assert session_of("/ws?session=show&nocache=7") == ("show", None)

@@ -37,10 +37,6 @@ def test_renderings_are_of_the_format_asked_for() -> None:
     assert content.splitlines()[0].split()[2] == b"50"
 
 
-def test_renderings_speak_a_text() -> None:
-    assert b"Hello" in rendered(b"Hello there", format="vtt")[1]
-
-
 @pytest.mark.parametrize(
     ("query", "words"),
     [

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import contextlib
 
-import pytest
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
-
-pytest.importorskip("starlette", reason="needs the asgi extra")
-
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from realizer.core.settings import Settings
 from realizer.server.http.socket_client import SocketClient

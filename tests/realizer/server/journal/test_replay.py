@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
+from realizer.server.http import protocols
 from realizer.server.journal import Entry, SavedSession, journal_at
 from realizer.server.journal.entry import NOTE
 from realizer.server.journal.replay import STALLS, ReplayNote, ReplayWatch, restore_session
@@ -27,7 +28,6 @@ from realizer.server.journal.session_journal import ENTRIES
 from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from realizer.server.transports.websocket import protocol
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock, spoken
@@ -277,7 +277,7 @@ def test_restored_session_is_unchanged_by_connections_that_still_leave(
     where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(session_host, "EXPIRY_INTERVAL", 0.05)
-    monkeypatch.setattr(protocol, "GOODBYE", LIMIT)
+    monkeypatch.setattr(protocols, "GOODBYE", LIMIT)
 
     async def run() -> None:
         async with (

@@ -94,6 +94,21 @@ def test_workers_bring_clients_of_a_session_together(workers: Workers) -> None:
     played(test())
 
 
+def test_workers_play_what_is_posted_to_a_session(workers: Workers) -> None:
+    async def test() -> None:
+        for number in (0, 1):
+            name = one_of(number)
+            posted = urllib.request.Request(
+                f"http://127.0.0.1:{workers.port}/sessions/{name}/bml", NOD.format(f"p{number}").encode()
+            )
+            with await asyncio.to_thread(urllib.request.urlopen, posted) as answer:
+                assert (answer.status, answer.headers["Connection"]) == (202, "close")
+            async with connect(f"{address(workers)}?session={name}&seen=0") as looks:
+                await message_with(looks, f'"p{number}:end"')
+
+    played(test())
+
+
 def test_workers_send_rows_ahead_and_take_them_back(workers: Workers) -> None:
     async def test() -> None:
         urls = [f"{address(workers)}?session={one_of(number)}" for number in (0, 1)]

@@ -12,12 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.asyncio.client import ClientConnection, connect
-from websockets.asyncio.server import ServerConnection, serve
 from websockets.exceptions import ConnectionClosed
 
 from realizer.core.settings import Settings
+from realizer.server.http import protocols
+from realizer.server.http.protocols import SLICE
+from realizer.server.http.socket_client import SocketClient
 from realizer.server.serve import Server
-from realizer.server.transports.websocket.protocol import SLICE, WebSocketClient
 
 LIMIT = 60  # s; a hung test ends
 
@@ -42,25 +43,18 @@ def answers(*requests: bytes) -> list[bytes]:
 
 
 def request(method: str, target: str = "/", body: str = "") -> bytes:
-    head = f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nContent-Length: {len(body)}\r\n\r\n"
+    head = f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n"
+    head += f"Content-Length: {len(body)}\r\n\r\n"
     return (head + body).encode()
 
 
-def test_protocol_answers_a_post_with_a_hint() -> None:
-    for answer in answers(
-        request("POST", body="hello"), request("POST", "/realize", "<bml id='b'/>" * 10_000)
-    ):
-        assert answer.startswith(b"HTTP/1.1 404 ")
-        assert b"send BML through the WebSocket at /ws" in answer
-
-
-@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "PATCH", "CONNECT", "TRACE"])
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "PATCH", "POST", "TRACE"])
 def test_protocol_refuses_other_methods(method: str) -> None:
     (answer,) = answers(request(method))
     head, _, body = answer.partition(b"\r\n\r\n")
     assert head.startswith(b"HTTP/1.1 405 ")
-    assert b"\r\nAllow: GET, HEAD" in head
-    assert body == b"wanted GET or HEAD\n"
+    assert set(re.search(rb"\r\nallow: (.*)", head)[1].strip().split(b", ")) == {b"GET", b"HEAD"}  # type: ignore[index]
+    assert body == f"wanted GET or HEAD /, got {method}\n".encode()
 
 
 def test_protocol_answers_head_as_get_without_the_body() -> None:
@@ -69,25 +63,19 @@ def test_protocol_answers_head_as_get_without_the_body() -> None:
         head, blank, body = got.partition(b"\r\n\r\n")
         assert body
         assert head.startswith(b"HTTP/1.1 " + status)
-        lines = {line for line in asked.split(b"\r\n") if not line.startswith(b"Date")}
+        lines = {line for line in asked.split(b"\r\n") if not line.startswith(b"date")}
         assert lines - {b""} <= set(head.split(b"\r\n"))
         assert asked.endswith(blank)
 
 
-def test_protocol_refuses_a_get_with_a_body() -> None:
-    chunked = (
-        b"GET / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n5\r\nhello\r\n0\r\n\r\n"
-    )
-    for answer in answers(request("GET", body="hello"), request("GET", body=200_000 * "x"), chunked):
-        head, _, body = answer.partition(b"\r\n\r\n")
-        assert head.startswith(b"HTTP/1.1 400 ")
-        assert body.startswith(b"wanted GET, in HTTP/1.1 and without a body: ")
+def test_protocol_keeps_a_connection_for_further_requests() -> None:
+    kept = request("GET", "/healthz").replace(b"Connection: close\r\n", b"")
+    (answer,) = answers(kept + kept + request("GET", "/healthz"))
+    assert answer.count(b"HTTP/1.1 200 ") == 3
 
 
 def test_protocol_answers_what_is_no_request() -> None:
     for answer in answers(
-        b"GET / HTTP/1.0\n\n",
-        b"GET / HTTP/2.0\r\n\r\n",
         b"GET /\xe9 HTTP/1.1\r\n\r\n",
         b"\x16\x03\x01\x02\0\r\n\r\n",
     ):
@@ -103,7 +91,7 @@ def test_protocol_answers_a_get_that_comes_in_parts() -> None:
 @given(st.lists(st.binary(max_size=40) | st.text("/%.?[]:#@", max_size=20).map(str.encode), min_size=40))
 def test_protocol_answers_any_bytes_without_an_error(targets: list[bytes]) -> None:
     for answer in answers(
-        *(b"GET /" + target + b" HTTP/1.1\r\nHost: localhost\r\n\r\n" for target in targets)
+        *(b"GET /" + t + b" HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n" for t in targets)
     ):
         assert re.match(rb"HTTP/1\.1 [24]\d\d ", answer)
 
@@ -172,32 +160,33 @@ def test_connection_reads_large_messages_whole() -> None:
 def test_protocol_counts_errors_of_requests() -> None:
     async def run() -> None:
         async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
-            for method in ("POST", "GET"):
+            for method, status in (("POST", b" 405 "), ("GET", b" 404 "), ("\x01", b" 400 ")):
                 reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
                 writer.write(request(method, "/nothing"))
-                assert b" 404 " in await reader.readline()
+                assert status in await reader.readline()
                 writer.close()
             text = server._sessions.metrics_text()
-        assert "realizer_http_errors_total 2\n" in text
+        assert "realizer_http_errors_total 3\n" in text
         assert "realizer_http_failures_total 0\n" in text
 
     asyncio.run(run())
 
 
-def between(test: Callable[[WebSocketClient, ClientConnection], Awaitable[None]]) -> None:
+def between(test: Callable[[SocketClient, ClientConnection], Awaitable[None]]) -> None:
     """Run a test with both ends of a connection."""
 
     async def run() -> None:
-        ours: asyncio.Future[ServerConnection] = asyncio.get_running_loop().create_future()
+        ours = asyncio.get_running_loop().create_future()
 
-        async def handle(connection: ServerConnection) -> None:
-            ours.set_result(connection)
-            await connection.wait_closed()
+        async def serve(client: SocketClient) -> None:
+            ours.set_result(client)
+            while await client.receive() is not None:
+                pass
 
-        async with asyncio.timeout(LIMIT), serve(handle, "127.0.0.1", 0, compression=None) as server:
-            port = server.sockets[0].getsockname()[1]
-            async with connect(f"ws://127.0.0.1:{port}", max_size=None, max_queue=None) as theirs:
-                await test(WebSocketClient(await ours), theirs)
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+            server._hub.connections.serve = serve  # type: ignore[method-assign]
+            async with connect(server.url, max_size=None, max_queue=None) as theirs:
+                await test(await ours, theirs)
 
     asyncio.run(run())
 
@@ -210,7 +199,7 @@ def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
             bytes(range(256)) * (length // 256) + bytes(length % 256),
         ]
 
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: SocketClient, theirs: ClientConnection) -> None:
         for message in sent:
             client.send(message)
         assert [await theirs.recv() for _ in sent] == sent
@@ -219,7 +208,7 @@ def test_writer_sends_messages_of_any_length_whole_and_in_order() -> None:
 
 
 def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: SocketClient, theirs: ClientConnection) -> None:
         client.send("one")
         assert await asyncio.wait_for(await theirs.ping(), LIMIT) >= 0
         client.send(b"two")
@@ -229,7 +218,7 @@ def test_writer_is_not_disturbed_by_frames_of_the_library() -> None:
 
 
 def test_writer_sends_nothing_after_the_end() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: SocketClient, theirs: ClientConnection) -> None:
         client.send("last")
         client.disconnect(1013, "enough")
         client.send("too late")
@@ -246,7 +235,7 @@ def test_writer_sends_nothing_after_the_end() -> None:
 
 
 def test_writer_counts_what_is_not_read() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: SocketClient, theirs: ClientConnection) -> None:
         theirs.transport.pause_reading()
         while client.unsent_bytes < 100_000:
             client.send(bytes(1_000_000))
@@ -259,7 +248,7 @@ def test_writer_counts_what_is_not_read() -> None:
 
 
 def test_writer_cuts_a_long_reason() -> None:
-    async def test(client: WebSocketClient, theirs: ClientConnection) -> None:
+    async def test(client: SocketClient, theirs: ClientConnection) -> None:
         client.disconnect(1013, "é" * 100)  # two bytes each, and room for 123
         with pytest.raises(ConnectionClosed) as closed:
             await theirs.recv()
@@ -267,3 +256,31 @@ def test_writer_cuts_a_long_reason() -> None:
         assert (closed.value.rcvd.code, closed.value.rcvd.reason) == (1013, "é" * 61)
 
     between(test)
+
+
+def test_connection_ends_if_its_request_does_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(protocols, "OPENING", 0.1)
+    for part in (b"", b"GET / HT", b"GET /healthz HTTP/1.1\r\nHost: x\r\n"):
+        assert answers(part) == [b""]
+
+
+def test_connection_ends_if_its_answer_is_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(protocols, "OPENING", 0.2)
+
+    async def run() -> None:
+        async with asyncio.timeout(LIMIT), Server(Settings(port=0, voice="silent")) as server:
+            _, writer = await asyncio.open_connection("127.0.0.1", server.port, limit=1000)
+            writer.transport.pause_reading()  # type: ignore[attr-defined]
+            writer.write(8 * request("GET", "/faces/ada").replace(b"Connection: close\r\n", b""))
+            while not server._web._connections:
+                await asyncio.sleep(0)
+            await next(iter(server._web._connections)).closed.wait()
+            writer.transport.abort()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize("head", ["POST /ws HTTP/1.1", "GET /ws HTTP/1.1\r\nContent-Length: 5"])
+def test_protocol_refuses_a_websocket_by_another_method_or_with_a_body(head: str) -> None:
+    (answer,) = answers(UPGRADE.replace(b"GET /ws HTTP/1.1", head.encode()))
+    assert re.match(rb"HTTP/1\.1 40[05] ", answer)
