@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import Field, fields
 from functools import cache
 from typing import Any
 
@@ -14,6 +14,7 @@ import click
 from docs.generator import steps
 from realizer import cli as commands
 from realizer import tables
+from realizer.cli.serve import serve
 from realizer.core.settings import PREFIX, Settings
 from realizer.server.http.http_site import asyncapi
 from realizer.server.http.vocabulary import vocabulary as served_vocabulary
@@ -54,11 +55,25 @@ def api() -> dict[str, str]:
 def settings() -> dict[str, str]:
     """Return the table of settings."""
     head = (
-        "# Settings\n\nEach is a flag of `realizer serve` (`--max-rate 100`), a variable "
-        f"(`{PREFIX}MAX_RATE=100`), and a line of a TOML file (`max_rate = 100`, `--config FILE.toml`).\n\n"
+        f"# Settings\n\nEach is a variable (`{PREFIX}MAX_RATE=100`), a line of a TOML file "
+        "(`max_rate = 100`, `realizer serve --config FILE.toml`), and, where the table has one, a flag of "
+        "`realizer serve`. Flags override variables, and variables override the file.\n\n"
     )
-    rows = ((f"`{f.name}`", _value(f.default), f.metadata["description"]) for f in fields(Settings))
-    return {"settings.md": head + table(("setting", "default", "what it sets"), rows)}
+    flags = {option.name: f"`{option.opts[-1]}`" for option in serve.params}
+    rows = (
+        (f"`{f.name}`", flags.get(f.name, ""), _value(f.default), _wanted(f), f.metadata["description"])
+        for f in fields(Settings)
+    )
+    return {"settings.md": head + table(("setting", "flag", "default", "values", "what it sets"), rows)}
+
+
+def _wanted(setting: Field[Any]) -> str:
+    """Return what a setting accepts, as the error of a wrong value says it."""
+    try:
+        setting.metadata["read"](object())
+    except ValueError as wanted:
+        return str(wanted)
+    raise AssertionError(f"{setting.name} accepts anything")
 
 
 def messages() -> dict[str, str]:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from realizer.core.options import PlayOptions
-from realizer.core.settings import Settings, SettingsError
+from realizer.core.settings import OTHERS, Settings, SettingsError
 from tests.rows import each_row
 
 
@@ -45,15 +45,13 @@ def test_settings_refuse_a_misspelt_variable(variable: str, meant: str) -> None:
         Settings.read(environment={f"REALIZER_{variable}": "x"})
 
 
-def test_settings_ignore_other_variables() -> None:
-    others = (
-        "REALIZER_FACES",
-        "REALIZER_DRAW",
-        "REALIZER_HEAD_DATA",
-        "REALIZER_NO_PAGE",
-        "REALIZER_BUILD_HOST",
-    )
-    assert Settings.read(environment=dict.fromkeys(others, "x")) == Settings()
+def test_settings_warn_of_variables_that_nothing_reads(caplog: pytest.LogCaptureFixture) -> None:
+    assert Settings.read(environment=dict.fromkeys(OTHERS, "x")) == Settings()
+    assert not caplog.messages
+    assert Settings.read(environment={"REALIZER_BUILD_HOST": "x", "REALIZED": "x"}) == Settings()
+    assert caplog.messages == [
+        "variable REALIZER_BUILD_HOST: no setting has this name, so it changes nothing"
+    ]
 
 
 def test_settings_refuse_an_unknown_name_in_the_file(tmp_path: Path) -> None:
