@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NoReturn
 
 import numpy as np
@@ -16,6 +17,7 @@ from realizer.core import work
 from realizer.playback.references import external_refs
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts, trims
 from realizer.scheduling import Member, schedule_together
+from realizer.scheduling.schedule_block import RULES, Trial, settle
 from realizer.scheduling.timing import UNKNOWN, Schedule, Timing, Warning
 from realizer.speech.utterance import WARP
 
@@ -107,6 +109,8 @@ class _PlanBuilder:
         self.warnings: list[Warning] = []
         self.claims: tuple[ResourceClaim, ...] = ()
         self.trims: dict[tuple[str, str], float] = {}
+        # Speeches that are placed one after the other, as `Member.sequences`; None if they must not be.
+        self.sequences: list[tuple[str | float, str | float]] | None = []
 
     def add_problems(self) -> None:
         for problem in self.block.problems:
@@ -145,54 +149,87 @@ class _PlanBuilder:
         existing_claims: Sequence[ResourceClaim],
         others: Sequence[Member],
     ) -> list[Schedule]:
-        """Step 3: solve for the times, and again without conflicting behaviours until no conflict is left.
+        """Step 3: solve for the times, and let things give way by `GIVES_WAY` until all that is left fits.
 
         In a block that refers to a time that is not known yet, behaviours hold their poses until then.
-        Speeches that overlap a little are placed one after the other, if the document and the voice allow it.
         """
-        sequences: list[tuple[str | float, str | float]] = []
-        may_sequence = True
         if any(_is_unknown_yet(external_times, ref) for ref in external_refs(self.block)):
             self.timings = {b: timing.with_hold for b, timing in self.timings.items()}
-        while True:
-            priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
-            own = Member(self.block, self.timings, priorities=priorities, sequences=tuple(sequences))
-            schedule, *moved = self.solve(own, others, external_times)
-            if schedule.failed or len(schedule.times) < len(self.timings):
-                if self.may_stretch:
-                    self.try_stretching(own, others, external_times, schedule)
-                if sequences:
-                    sequences, may_sequence = [], False
-                    continue
-            warnings = [
-                replace(w, text=self.with_place(self.behaviour_of(w), w.text))
-                for w in work.counted(schedule.warnings, 5)
-            ]
-            if schedule.failed:
-                self.refuse(warnings[0])
-            unscheduled = self.timings.keys() - schedule.times.keys()
-            lost_constraints = [self.block.constraints[n] for n in schedule.lost_constraints]
-            about = [(self.behaviour_of(w), w) for w in warnings]
-            self.drop([(id, w) for id, w in about if id in unscheduled])
-            about_constraints = [w for id, w in about if id not in unscheduled]
-            character, all_warnings = self.block.character_id, (*self.warnings, *about_constraints)
-            schedule = replace(schedule, start=start, character=character, warnings=all_warnings)
-            self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
-            remaining = after_interrupts(existing_claims, interrupts(self.block, schedule))
-            # Speech may begin in a final silence of its own block if that speech cannot be faster.
-            found = conflicts(self.claims, remaining, start, in_silence=not may_sequence)
-            if not found:
-                # A dropped constraint must not bind the block when it is planned again, or others with it.
-                self.block = without_constraints(self.block, lost_constraints)
-                self.trims = dict(trims(self.claims, remaining))
-                return [schedule, *moved]
-            new_sequences = {pair for conflict in found if (pair := conflict.sequence) is not None}
-            new_sequences -= set(sequences)
-            if may_sequence and new_sequences:
-                sequences += new_sequences
-                continue
-            losers = ((conflict.claim.behaviour, str(conflict)) for conflict in work.counted(found, 10))
-            self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
+        self.start, self.existing_claims = start, existing_claims
+        trial = Trial([self.member(), *others], external_times, self.context.grace)
+        settle(trial, [*RULES, *(partial(rule, self) for rule in GIVES_WAY)])
+        # A dropped constraint must not bind the block when it is planned again, or others with it.
+        self.block = without_constraints(self.block, self.lost_constraints)
+        return self.solved
+
+    def member(self) -> Member:
+        """Return what is left of the block, to be scheduled."""
+        priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
+        return Member(self.block, self.timings, priorities=priorities, sequences=tuple(self.sequences or ()))
+
+    def begin_again(self, trial: Trial) -> bool:
+        """Let what is left be solved again; constraints that were lost count again."""
+        trial.begin_again([self.member(), *trial.members[1:]])
+        return True
+
+    def stretch_speech(self, trial: Trial) -> bool:
+        """The rate of speech goes, if more of the block fits then: it has to be planned with such speech."""
+        self.solved = trial.schedules()
+        if self.is_incomplete and self.may_stretch and (lengths := self.better_lengths(trial)):
+            raise _NoPlan(lengths=lengths)
+        return False
+
+    def leave_sequence(self, trial: Trial) -> bool:
+        """The order of speeches that overlap goes, if with it something else does not fit."""
+        if not (self.is_incomplete and self.sequences):
+            return False
+        self.sequences = None
+        return self.begin_again(trial)
+
+    def leave_out_unplaced(self, trial: Trial) -> bool:
+        """A behaviour that could not be placed goes, and what refers to it; the block, if it is required."""
+        schedule = self.solved[0]
+        warnings = [
+            replace(w, text=self.with_place(self.behaviour_of(w), w.text))
+            for w in work.counted(schedule.warnings, 5)
+        ]
+        if schedule.failed:
+            self.refuse(warnings[0])
+        self.lost_constraints = [self.block.constraints[n] for n in schedule.lost_constraints]
+        unscheduled = self.timings.keys() - schedule.times.keys()
+        about = [(self.behaviour_of(w), w) for w in warnings]
+        self.drop([(id, w) for id, w in about if id in unscheduled])
+        all_warnings = (*self.warnings, *(w for id, w in about if id not in unscheduled))
+        schedule = replace(schedule, start=self.start, warnings=all_warnings)
+        self.solved[0] = schedule
+        self.claims = tuple(claims(self.block, schedule, self.kinds, self.context))
+        remaining = after_interrupts(self.existing_claims, interrupts(self.block, schedule))
+        # Speech may begin in a final silence of its own block if that speech cannot be faster.
+        self.conflicts = conflicts(self.claims, remaining, self.start, in_silence=self.sequences is None)
+        self.trims = {} if self.conflicts else dict(trims(self.claims, remaining))
+        return False
+
+    def speak_in_sequence(self, trial: Trial) -> bool:
+        """The time of speeches that overlap a little goes: they are placed one after the other.
+
+        That is tried once, for all that is found.
+        """
+        new = {pair for conflict in self.conflicts if (pair := conflict.sequence) is not None}
+        if self.sequences is None or not (new := new.difference(self.sequences)):
+            return False
+        self.sequences += new
+        return self.begin_again(trial)
+
+    def drop_losers(self, trial: Trial) -> bool:
+        """A behaviour goes that wants what another one has: one of an earlier block, or of higher rank."""
+        losers = ((found.claim.behaviour, str(found)) for found in work.counted(self.conflicts, 10))
+        self.drop((id, self.warning("CANNOT_CREATE_BEHAVIOR", id, text)) for id, text in losers)
+        return bool(self.conflicts) and self.begin_again(trial)
+
+    @property
+    def is_incomplete(self) -> bool:
+        """Whether some of the block could not be placed."""
+        return self.solved[0].failed or len(self.solved[0].times) < len(self.timings)
 
     def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
         """Step 4: return the channels of the scheduled behaviours, in seconds from block start."""
@@ -203,36 +240,22 @@ class _PlanBuilder:
                 channels[node.id] = self.kinds[node.tag].expand(node, schedule.times[node.id], self.context)
         return channels
 
-    def solve(
-        self, own: Member, others: Sequence[Member], external_times: Callable[[SyncRef], float | None]
-    ) -> list[Schedule]:
-        return schedule_together([own, *others], outside=external_times, grace=self.context.grace)
-
-    def try_stretching(
-        self,
-        own: Member,
-        others: Sequence[Member],
-        external_times: Callable[[SyncRef], float | None],
-        rigid: Schedule,
-    ) -> None:
-        """Raise _NoPlan with lengths if speech at another rate lets more behaviours fit."""
-        flexible = dict(own.timings)
-        for node in self.block.behaviours:
-            if (
-                node.id in flexible
-                and (timing := self.kinds[node.tag].stretch(node, self.context)) is not None
-            ):
-                flexible[node.id] = timing
-        stretchable = {b: timing for b, timing in flexible.items() if timing is not own.timings[b]}
+    def better_lengths(self, trial: Trial) -> dict[str, dict[str, float]]:
+        """Return lengths of speech, as of a Schedule, with which more behaviours fit; {} for none."""
+        own, rigid = self.member(), self.solved[0]
+        nodes = [node for node in self.block.behaviours if node.id in own.timings]
+        found = {node.id: self.kinds[node.tag].stretch(node, self.context) for node in nodes}
+        stretchable = {b: timing for b, timing in found.items() if timing is not None}
         if not stretchable:
-            return
+            return {}
 
         def solved(timings: Mapping[str, Timing]) -> Schedule:
-            return self.solve(replace(own, timings=timings), others, external_times)[0]
+            members = [replace(own, timings=timings), *trial.members[1:]]
+            return schedule_together(members, outside=trial.outside, grace=trial.grace)[0]
 
-        stretched = solved(flexible)
+        stretched = solved({**own.timings, **stretchable})
         if stretched.failed or len(stretched.times) <= len(rigid.times):
-            return
+            return {}
         points = {b: stretched.times[b] - stretched.times[b][0] for b in stretchable if b in stretched.times}
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in points}
         # Some voices have one rate for a whole speech. Of the rates of the stretched gaps, take the one with
@@ -244,17 +267,15 @@ class _PlanBuilder:
             gaps = own.timings[b].preferred
             rates = np.diff(points[b])[gaps > MIN_RATE_GAP] / gaps[gaps > MIN_RATE_GAP]
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
-                trial = solved({**own.timings, b: replace(own.timings[b], preferred=gaps * rate)})
-                if not trial.failed and len(trial.times) > best_count:
-                    best_count = len(trial.times)
+                at_rate = solved({**own.timings, b: replace(own.timings[b], preferred=gaps * rate)})
+                if not at_rate.failed and len(at_rate.times) > best_count:
+                    best_count = len(at_rate.times)
                     points[b] = natural[b] * rate
-        lengths = {
+        return {
             b: dict(zip(stretchable[b].points[1:], map(float, points[b][1:]), strict=True))
             for b in points
             if np.abs(points[b] - natural[b]).max() > TIME_TOLERANCE
         }
-        if lengths:
-            raise _NoPlan(lengths=lengths)
 
     def drop(self, warnings: Iterable[tuple[str, Warning]]) -> None:
         """Drop behaviours, by id, and the references to them; each one's warning names both."""
@@ -291,6 +312,16 @@ class _PlanBuilder:
     def with_place(self, behaviour: str, text: str) -> str:
         place = self.original.places.get(behaviour)
         return text if place is None else place.with_place(text)
+
+
+# What else gives way in a new block, in this order, after the `RULES` of what is scheduled together.
+GIVES_WAY: tuple[Callable[[_PlanBuilder, Trial], bool], ...] = (
+    _PlanBuilder.stretch_speech,
+    _PlanBuilder.leave_sequence,
+    _PlanBuilder.leave_out_unplaced,
+    _PlanBuilder.speak_in_sequence,
+    _PlanBuilder.drop_losers,
+)
 
 
 def _is_unknown_yet(external_times: Callable[[SyncRef], float | None], ref: SyncRef) -> bool:

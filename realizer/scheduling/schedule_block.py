@@ -1,9 +1,12 @@
-"""Scheduling of blocks: solve, drop parts in conflicts, and solve the rest again."""
+"""Scheduling of blocks: solve, let something give way, and solve again, until all that is left fits."""
 
-from collections.abc import Callable, Collection, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
+from typing import TypeAlias
 
 from bml_schema import SyncRef
 from realizer.core import work
@@ -28,102 +31,201 @@ def schedule_together(
     """Return the sync times of a new block and of playing blocks, solved together, each from its own start.
 
     Constraints hold, gaps are as near as possible to their preference, free behaviours start as early as they
-    can. In a conflict, an optional constraint is dropped, or else the behaviour of the lowest priority that
-    is not required (of equals the later one), with one warning each.
-
-    Behaviours that would have to start before their block, because a point of another block that they refer
-    to has just passed, start as soon as they can and keep their lengths, if that is within `grace`. If not,
-    they are late by `grace` and shorter, or dropped if that is not enough. If the new block fails, only its
-    own schedule is returned.
+    can. `RULES` say what gives way where not all of this can hold, with one warning for each dropped part. If
+    the new block fails, only its own schedule is returned.
 
     Args:
         members: the new block first; past points of the others are fixed, all else may move.
         outside: a reference into a block that is no member, with its offset -> seconds on the members' clock;
             None if it is unknown, which drops the referring part.
+        grace: seconds by which a behaviour may be later than its references into other blocks say.
     """
-    new = members[0].block
-    problem = problem_of(members, outside)
-    outcome = in_time = _settle(problem, new.id)
-    late: dict[str, float] = {}
-    if grace > 0 and outcome.warnings and problem.external:
-        late = _lateness(problem, new.id)
-        shifts = {behaviour: min(seconds, grace) for behaviour, seconds in late.items()}
-        while shifts:
-            shifted = [replace(members[0], late=shifts), *members[1:]]
-            outcome = _settle(problem_of(shifted, outside), new.id)
-            lost = {id.removeprefix(f"{new.id}:") for part in outcome.lost for id in (part.id, *part.names)}
-            # Behaviours that are tied to each other are equally late.
-            too_late = {late[behaviour] for behaviour in lost & shifts.keys() if late[behaviour] > grace}
-            if not too_late:
-                members = shifted
-                break
-            shifts = {behaviour: by for behaviour, by in shifts.items() if late[behaviour] not in too_late}
-            outcome = in_time
-    warnings = tuple(outcome.warnings)
-    if late:
-        warnings = tuple(
-            _with_lateness(w, late.get(w.id.removeprefix(f"{new.id}:"), 0.0), grace) for w in warnings
-        )
-    if outcome.solution is None:
-        return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
-    problem, found = outcome.problem, outcome.solution
-    lost_constraints = tuple(part.order for part in outcome.lost if part.is_constraint)
-    number = {part.id: n for n, part in enumerate(problem.behaviours)}
-    schedules = []
-    for member in members:
-        times: dict[str, Float64] = {}
-        whole = found.time - member.start
-        whole.setflags(write=False)
-        for node in work.counted(member.block.behaviours):
-            n = number.get(f"{member.block.id}:{node.id}")
-            if n is not None and node.id not in times:
-                first, k = problem.first[n], len(problem.timings[n].points)
-                times[node.id] = whole[first : first + k]
-        schedules.append(
-            Schedule(
-                member.block.id,
-                {name: member.timings[name].points for name in times},
-                times,
-                start=member.start,
-                warnings=warnings if member is members[0] else (),
-                cost=found.cost,
-                late={name: seconds for name, seconds in member.late.items() if name in times},
-                lost_constraints=lost_constraints if member is members[0] else (),
-                character=member.block.character_id,
+    trial = Trial(members, outside, grace)
+    settle(trial, RULES)
+    return trial.schedules()
+
+
+class Trial:
+    """Blocks that are solved together, and what they have lost so far.
+
+    Attributes:
+        members: the new block first.
+        problem: what is left of `whole`, the problem of all members.
+        solution: of `problem`; None before it is solved, or if the new block is refused.
+        lost, warnings: the dropped parts, and why.
+        late: behaviour of the new block -> seconds by which it starts too early if its references into other
+            blocks hold; None if that was not asked.
+    """
+
+    def __init__(
+        self, members: Sequence[Member], outside: Callable[[SyncRef], float | None], grace: float
+    ) -> None:
+        self.outside = outside
+        self.grace = grace
+        self.begin_again(members)
+
+    def begin_again(self, members: Sequence[Member]) -> None:
+        """Take other members, of which nothing is lost yet."""
+        self.late: Mapping[str, float] | None = None
+        self.in_time: Trial | None = None
+        self._set(members, problem_of(members, self.outside))
+
+    def _set(self, members: Sequence[Member], whole: Problem) -> None:
+        self.members = members
+        self.problem = self.whole = whole
+        self.solution: Solution | None = None
+        self.failed = False
+        self.lost: list[Part] = []
+        self.warnings: list[Warning] = []
+
+    @property
+    def block(self) -> str:
+        """The id of the new block."""
+        return self.members[0].block.id
+
+    def drop(self, dropped: Mapping[Part, Warning]) -> None:
+        self.lost += dropped
+        self.warnings += dropped.values()
+        self.problem = self.problem.without(dropped)
+
+    def refuse(self, warning: Warning) -> None:
+        """Refuse the new block."""
+        self.warnings.append(warning)
+        self.failed = True
+
+    def delay(self, late: Mapping[str, float]) -> None:
+        """Begin again with behaviours of the new block later than their references into other blocks say."""
+        members = [replace(self.members[0], late=late), *self.members[1:]]
+        self._set(members, problem_of(members, self.outside))
+
+    def schedules(self) -> list[Schedule]:
+        """Return the schedules of the members, or only that of the new block if it is refused."""
+        warnings, new = tuple(self.warnings), self.members[0].block
+        if self.late:
+            lateness = (self.late.get(w.id.removeprefix(f"{new.id}:"), 0.0) for w in warnings)
+            warnings = tuple(
+                _with_lateness(w, late, self.grace) for w, late in zip(warnings, lateness, strict=True)
             )
-        )
-    return schedules
+        if self.solution is None:
+            return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
+        problem, found = self.problem, self.solution
+        number = {part.id: n for n, part in enumerate(problem.behaviours)}
+        schedules = []
+        for member in self.members:
+            times: dict[str, Float64] = {}
+            whole = found.time - member.start
+            whole.setflags(write=False)
+            for node in work.counted(member.block.behaviours):
+                n = number.get(f"{member.block.id}:{node.id}")
+                if n is not None and node.id not in times:
+                    first, k = problem.first[n], len(problem.timings[n].points)
+                    times[node.id] = whole[first : first + k]
+            is_new = member is self.members[0]
+            lost_constraints = tuple(part.order for part in self.lost if part.is_constraint and is_new)
+            schedules.append(
+                Schedule(
+                    member.block.id,
+                    {name: member.timings[name].points for name in times},
+                    times,
+                    start=member.start,
+                    warnings=warnings if is_new else (),
+                    cost=found.cost,
+                    late={name: seconds for name, seconds in member.late.items() if name in times},
+                    lost_constraints=lost_constraints,
+                    character=member.block.character_id,
+                )
+            )
+        return schedules
 
 
-class _Outcome(NamedTuple):
-    """The solution of a problem without the parts that were dropped, or None if all of it is refused."""
-
-    solution: Solution | None
-    problem: Problem
-    warnings: Sequence[Warning]
-    lost: Sequence[Part] = ()
+Rule: TypeAlias = Callable[[Trial], bool]
 
 
-def _settle(problem: Problem, block: str) -> _Outcome:
-    """Solve a problem, again without the parts that cannot be placed, until all that is left fits."""
-    warnings: list[Warning] = []
-    lost: list[Part] = []
-    while True:
-        found = _attempt(problem, block)
-        if isinstance(found, Solution):
-            return _Outcome(found, problem, warnings, lost)
-        if isinstance(found, Warning):
-            return _Outcome(None, problem, [*warnings, found], lost)
-        warnings += (warning for _, warning in found)
-        lost += (part for part, _ in found)
-        problem = problem.without(part for part, _ in found)
+def settle(trial: Trial, rules: Sequence[Rule]) -> None:
+    """Let things give way by the first rule that applies, again and again, until none does.
+
+    A rule changes the trial and returns True, or it returns False.
+    """
+    while any(rule(trial) for rule in rules):
+        pass
 
 
-def _lateness(problem: Problem, block: str) -> dict[str, float]:
+def drop_faults(trial: Trial) -> bool:
+    """A part that refers to what does not exist goes; the block, if the part is required."""
+    faults = () if trial.failed else trial.problem.faults
+    for part, text in faults:
+        if part.required:
+            warning = fault_warning(part, text)
+            trial.refuse(replace(warning, id=trial.block, text=f"required: {warning.text}"))
+            return False
+    trial.drop({part: fault_warning(part, text) for part, text in faults})
+    return bool(faults)
+
+
+def drop_clashes(trial: Trial) -> bool:
+    """Of relations that cannot hold together, an optional constraint goes, or else a behaviour.
+
+    It is the one of the lowest priority, of equals the later one; the block, if all are required.
+    """
+    if trial.failed:
+        return False
+    clashes = solve(trial.problem)
+    if isinstance(clashes, Solution):
+        trial.solution = clashes
+        return False
+    drops: dict[Part, Warning] = {}
+    for clash in work.counted(clashes, 20):
+        # A conflict that a drop of this round may have settled is examined again in the next.
+        if not (drops.keys().isdisjoint(clash.parts) and drops.keys().isdisjoint(clash.named)):
+            continue
+        part = choose(clash)
+        if part is None:
+            trial.refuse(refusal(trial.block, clash))
+            return False
+        drops[part] = warning_of(clash, part)
+    trial.drop(drops)
+    return True
+
+
+def come_late(trial: Trial) -> bool:
+    """Punctuality goes, if something would be lost that refers to points of other blocks.
+
+    Behaviours that would have to start before their block, because such a point has just passed, start as
+    soon as they can and keep their lengths, if that is within `grace`. If not, they are late by `grace` and
+    shorter, or dropped if that is not enough.
+    """
+    if trial.late is None:
+        if not (trial.grace > 0 and trial.warnings and trial.whole.external):
+            return False
+        trial.in_time = copy(trial)
+        trial.late = _lateness(trial)
+        shifts = {behaviour: min(seconds, trial.grace) for behaviour, seconds in trial.late.items()}
+    else:
+        lost = {id.removeprefix(f"{trial.block}:") for part in trial.lost for id in (part.id, *part.names)}
+        shifts = dict(trial.members[0].late)
+        # Behaviours that are tied to each other are equally late.
+        too_late = {trial.late[b] for b in lost & shifts.keys() if trial.late[b] > trial.grace}
+        if not too_late:
+            return False
+        shifts = {b: by for b, by in shifts.items() if trial.late[b] not in too_late}
+    if shifts:
+        trial.delay(shifts)
+        return True
+    assert trial.in_time is not None
+    vars(trial).update(vars(trial.in_time) | {"late": trial.late})
+    return False
+
+
+# What gives way in blocks that are solved together, in this order.
+RULES: tuple[Rule, ...] = (drop_faults, drop_clashes, come_late)
+
+
+def _lateness(trial: Trial) -> dict[str, float]:
     """Return behaviour -> seconds by which it starts too early if its references into other blocks hold.
 
     Behaviours that are tied to each other are late together, so that they keep their distances.
     """
+    problem, block = trial.whole, trial.block
     own = {n: part for n, part in enumerate(problem.behaviours) if part.id.startswith(f"{block}:")}
     groups = UnionFind(len(problem.behaviours))
     for relation in problem.equalities:
@@ -139,7 +241,9 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
     tied = {groups.find(n) for n, part in own.items() if part.id in named}
     own = {n: part for n, part in own.items() if groups.find(n) in tied}
     earliest = [t - LONG_AGO if n in own else t for n, t in enumerate(problem.earliest)]
-    outcome = _settle(replace(problem, earliest=earliest), block)
+    outcome = copy(trial)
+    outcome._set(trial.members, replace(problem, earliest=earliest))
+    settle(outcome, (drop_faults, drop_clashes))
     if outcome.solution is None:
         return {}
     starts = {
@@ -160,7 +264,7 @@ def _lateness(problem: Problem, block: str) -> dict[str, float]:
     }
 
 
-def _room(outcome: _Outcome, group: Sequence[int | None], free: Collection[int]) -> dict[int, float]:
+def _room(outcome: Trial, group: Sequence[int | None], free: Collection[int]) -> dict[int, float]:
     """Return by how many seconds each free group, which nothing keeps from starting earlier, can be later.
 
     `group` has the group of each behaviour of the outcome, or None.
@@ -188,25 +292,3 @@ def _with_lateness(warning: Warning, late: float, grace: float) -> Warning:
     return replace(
         warning, text=f"{warning.text}; it comes {late:.3g} s too late, and the grace is {grace:g} s"
     )
-
-
-def _attempt(problem: Problem, block: str) -> Solution | list[tuple[Part, Warning]] | Warning:
-    if problem.faults:
-        required = next((fault for fault in problem.faults if fault[0].required), None)
-        if required is not None:
-            warning = fault_warning(*required)
-            return Warning(block, warning.type, f"required: {warning.text}")
-        return [(part, fault_warning(part, text)) for part, text in problem.faults]
-    clashes = solve(problem)
-    if isinstance(clashes, Solution):
-        return clashes
-    drops: dict[Part, Warning] = {}
-    for clash in work.counted(clashes, 20):
-        # A conflict that a drop of this round may have settled is examined again in the next.
-        if not (drops.keys().isdisjoint(clash.parts) and drops.keys().isdisjoint(clash.named)):
-            continue
-        part = choose(clash)
-        if part is None:
-            return refusal(block, clash)
-        drops[part] = warning_of(clash, part)
-    return list(drops.items())
