@@ -78,7 +78,7 @@ def main() -> None:
             f"{'FAP':28}{'usual':>8}{'error %':>9}{'mirror %':>9}{'others %':>9}{'flips %':>9}{'rough %':>9}"
             f"{'w':>4}{'score':>7}"
         )
-        order = sorted(results, key=lambda t: (t.score, -t.weight, -max(t.error, t.others, t.rough)))
+        order = sorted(results, key=lambda t: (t.score, -t.weight, -max(t.error, t.side_effect, t.roughness)))
         for result in results if chosen.all else order[: chosen.worst]:
             print(line(result))
         each = ", ".join(f"{k}: {sum(t.score == k for t in results)}" for k in (3, 2, 1, 0))

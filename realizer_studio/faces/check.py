@@ -1,4 +1,4 @@
-"""The check of a face folder: every fault, with its file and what to change."""
+"""The check of a face folder, which reports every fault with its file and a remedy."""
 
 import io
 from collections.abc import Callable, Mapping
@@ -24,8 +24,8 @@ from realizer_studio.faces.au.measure import read_shapes
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup
 from realizer_studio.faces.mpeg4.zones import mask_faults
 
-FARTHEST = 20  # FAPU a FAP unit; no skin goes further than its feature point by that much
-OFF = 0.004  # m; a feature point further than this from its vertex is off the mesh
+FARTHEST = 20  # times the feature point's displacement; the largest displacement of a vertex
+MAX_DISTANCE = 0.004  # m; a feature point further than this from its vertex is off the mesh
 PARTS = (
     *NEEDED, "upper_teeth", "lower_teeth", "tongue", "tears", "brows", "lashes", "hair", "beard", "shirt",
     "glasses", "other",
@@ -55,8 +55,8 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
     mesh = tried(lambda: read_arrays(folder / "mesh.npz", MESH))
     points = tried(lambda: read_features(folder / "features.csv"))
     stored = tried(lambda: read_arrays(folder / "fields.npz", ARRAYS))
-    if own := tried(lambda: own_file(folder)):
-        tried(lambda: read_mapping(own))
+    if mapping_file := tried(lambda: own_file(folder)):
+        tried(lambda: read_mapping(mapping_file))
     zones = folder / FILE
     setup = tried(lambda: read_setup(zones)) if zones.is_file() else None
     if (shapes := folder / "au_shapes.npz").is_file():
@@ -76,8 +76,8 @@ def check_face(name: str = "default", directory: Path | str | None = None) -> tu
         ]
         faults += parts
     if points:
-        places = {key: np.array(point.place, np.float32) for key, point in points.items()}
-        tried(lambda: fapu_of(places, folder / "features.csv"))
+        positions = {key: np.array(point.place, np.float32) for key, point in points.items()}
+        tried(lambda: fapu_of(positions, folder / "features.csv"))
         if mesh and not values:
             faults += _point_faults(folder, points, mesh["vertices"], mesh["triangles"])
     if stored and n is not None:
@@ -129,10 +129,10 @@ def _point_faults(folder: Path, points: dict[str, Point], vertices: Any, triangl
         elif not np.isfinite(point.place).all():
             faults.append(f"{path}: {name}: wanted finite x, y, z, got {point.place}")
         elif name not in INSIDE:
-            off = float(np.linalg.norm(vertices[point.vertex] - point.place))
-            if off > OFF:
+            distance = float(np.linalg.norm(vertices[point.vertex] - point.place))
+            if distance > MAX_DISTANCE:
                 faults.append(
-                    f"{path}: {name}: the point is {off * 1000:.1f} mm off its vertex {point.vertex}; "
+                    f"{path}: {name}: the point is {distance * 1000:.1f} mm off its vertex {point.vertex}; "
                     "put the nearest vertex there, or move the point onto the mesh"
                 )
             elif not on_surface[point.vertex]:

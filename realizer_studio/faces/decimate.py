@@ -18,27 +18,30 @@ def decimate(vertices: Float64, triangles: Int32, tolerance: Float64) -> tuple[A
 
     Args:
         vertices: (n, 3) metres; triangles: (m, 3).
-        tolerance: (n,) metres that the surface may change by where a vertex goes; 0 keeps it.
+        tolerance: (n,) metres by which the surface may change where a vertex is removed; 0 keeps the vertex.
 
     Returns:
-        The vertices that are left, (k,) indices ascending, and the triangles over them, (l, 3). Rims
-        stay where they are, but for bends smaller than the tolerance.
+        The remaining vertices, (k,) indices ascending, and the triangles over them, (l, 3). Boundaries
+        keep their shape within the tolerance.
     """
-    return _Surface(vertices, triangles, tolerance).thin()
+    return _Surface(vertices, triangles, tolerance).decimated()
 
 
 class _Surface:
     def __init__(self, vertices: Float64, triangles: Int32, tolerance: Float64) -> None:
-        self.at = [tuple(row) for row in vertices.tolist()]
+        self.positions = [tuple(row) for row in vertices.tolist()]
         self.faces: list[tuple[int, int, int] | None] = [tuple(row) for row in triangles.tolist()]
-        n = len(self.at)
-        self.around: list[set[int]] = [set() for _ in range(n)]
+        n = len(self.positions)
+        self.triangles_at: list[set[int]] = [set() for _ in range(n)]
         for k, face in enumerate(triangles.tolist()):
             for corner in face:
-                self.around[corner].add(k)
-        ups = triangle_normals(vertices, triangles)
-        area = np.linalg.norm(ups, axis=1)
-        planes = np.c_[ups, -(ups * vertices[triangles[:, 0]]).sum(axis=1)] / np.maximum(area, 1e-20)[:, None]
+                self.triangles_at[corner].add(k)
+        normals = triangle_normals(vertices, triangles)
+        area = np.linalg.norm(normals, axis=1)
+        planes = (
+            np.c_[normals, -(normals * vertices[triangles[:, 0]]).sum(axis=1)]
+            / np.maximum(area, 1e-20)[:, None]
+        )
         each = planes[:, :, None] * planes[:, None, :] * area[:, None, None]
         self.quadric = np.zeros((n, 4, 4))
         self.weight = np.zeros(n)
@@ -55,67 +58,69 @@ class _Surface:
         self.tolerance = tolerance
         self.twin = mirror_twins(vertices, PAIRED).tolist()
 
-    def thin(self) -> tuple[Any, Int32]:
-        queue = [entry for v in np.flatnonzero(self.free).tolist() if (entry := self._best(v))]
+    def decimated(self) -> tuple[Any, Int32]:
+        queue = [entry for v in np.flatnonzero(self.free).tolist() if (entry := self.best_collapse(v))]
         heapq.heapify(queue)
         while queue:
             cost, v, u = heapq.heappop(queue)
-            entry = self._best(v) if self.around[v] else None
+            entry = self.best_collapse(v) if self.triangles_at[v] else None
             if entry is None:
                 continue
             if entry[0] > cost * 1.001 + 1e-12:
                 heapq.heappush(queue, entry)
                 continue
             _, v, u = entry
-            pairs = self._both(v, u)
+            pairs = self.with_mirror(v, u)
             if pairs is None:
                 continue
             touched: set[int] = set()
-            for gone, kept in pairs:
-                touched |= self._pull(gone, kept)
+            for removed, target in pairs:
+                touched |= self.collapse(removed, target)
             for other in touched:
-                if self.free[other] and self.around[other] and (again := self._best(other)):
+                if self.free[other] and self.triangles_at[other] and (again := self.best_collapse(other)):
                     heapq.heappush(queue, again)
         left = np.array([face for face in self.faces if face is not None], np.int32)
         used, inverse = np.unique(left, return_inverse=True)
         return used, inverse.reshape(-1, 3).astype(np.int32)
 
-    def _near(self, v: int) -> set[int]:
+    def neighbours(self, v: int) -> set[int]:
         out: set[int] = set()
-        for k in self.around[v]:
+        for k in self.triangles_at[v]:
             out.update(self.faces[k])  # type: ignore[arg-type]
         out.discard(v)
         return out
 
-    def _best(self, v: int) -> tuple[float, int, int] | None:
-        """Return the cost of collapsing v into its best neighbour (1 is the limit), v, and that neighbour."""
-        near = list(self.rim.get(v) or self._near(v))
-        if len(near) < 2:
+    def best_collapse(self, v: int) -> tuple[float, int, int] | None:
+        """Return the lowest cost of collapsing v, at most 1, with v and the neighbour, or None."""
+        neighbours = list(self.rim.get(v) or self.neighbours(v))
+        if len(neighbours) < 2:
             return None
-        ends = np.c_[np.array([self.at[u] for u in near]), np.ones(len(near))]
-        off = np.einsum("ni,ij,nj->n", ends, self.quadric[v], ends) / max(self.weight[v], 1e-20)
-        cost = np.sqrt(np.maximum(off, 0))
+        ends = np.c_[np.array([self.positions[u] for u in neighbours]), np.ones(len(neighbours))]
+        error = np.einsum("ni,ij,nj->n", ends, self.quadric[v], ends) / max(self.weight[v], 1e-20)
+        cost = np.sqrt(np.maximum(error, 0))
         if v in self.rim:
-            p, q = (self.at[u] for u in near)
-            cost = np.maximum(cost, _length(_cross(self.at[v], p, q)) / max(_square(p, q) ** 0.5, 1e-9))
+            p, q = (self.positions[u] for u in neighbours)
+            cost = np.maximum(
+                cost, _length(_cross(self.positions[v], p, q)) / max(_square(p, q) ** 0.5, 1e-9)
+            )
         cost = cost / self.tolerance[v]
         for k in np.argsort(cost)[:3]:
-            if cost[k] < 1 and self._allowed(v, near[k]):
-                return float(cost[k]), v, near[k]
+            if cost[k] < 1 and self.is_allowed(v, neighbours[k]):
+                return float(cost[k]), v, neighbours[k]
         return None
 
-    def _allowed(self, v: int, u: int) -> bool:
-        """Return whether a collapse makes no fold, sliver or hole: two shared neighbours, nothing flipped."""
-        if len(self._near(v) & self._near(u)) != (1 if v in self.rim else 2):
+    def is_allowed(self, v: int, u: int) -> bool:
+        """Return whether collapsing v into u makes no fold, sliver or hole."""
+        if len(self.neighbours(v) & self.neighbours(u)) != (1 if v in self.rim else 2):
             return False
         if v in self.rim and len(self.rim[v] | self.rim[u]) < 4:
             return False
-        for k in self.around[v]:
+        for k in self.triangles_at[v]:
             face = self.faces[k]
             if face is None or u in face:
                 continue
-            before = _cross(*(self.at[i] for i in face))
-            corners = [self.at[u if i == v else i] for i in face]
+            before = _cross(*(self.positions[i] for i in face))
+            corners = [self.positions[u if i == v else i] for i in face]
             after = _cross(*corners)
             long = max(_square(corners[k - 1], corners[k]) for k in range(3))
             size, old = _length(after), _length(before)
@@ -124,33 +129,33 @@ class _Surface:
                 return False
         return True
 
-    def _both(self, v: int, u: int) -> list[tuple[int, int]] | None:
-        """Return the collapse and its mirror image, or None if one is not allowed or they would meet."""
+    def with_mirror(self, v: int, u: int) -> list[tuple[int, int]] | None:
+        """Return the collapse and its mirror image, or None if one is not allowed or both share triangles."""
         tv, tu = self.twin[v], self.twin[u]
         if tv < 0 or tu < 0:
             return [(v, u)]
         if tv == v:
             return [(v, u)] if tu == u else None
-        if tv == u or not self.free[tv] or not self.around[tv] or tu not in self._near(tv):
+        if tv == u or not self.free[tv] or not self.triangles_at[tv] or tu not in self.neighbours(tv):
             return None
         # Collapses whose triangles meet could fold together.
-        if self.around[v] & self.around[tv] or not self._allowed(tv, tu):
+        if self.triangles_at[v] & self.triangles_at[tv] or not self.is_allowed(tv, tu):
             return None
         return [(v, u), (tv, tu)]
 
-    def _pull(self, v: int, u: int) -> set[int]:
-        near = self._near(v)
-        for k in list(self.around[v]):
+    def collapse(self, v: int, u: int) -> set[int]:
+        near = self.neighbours(v)
+        for k in list(self.triangles_at[v]):
             face = self.faces[k]
             assert face is not None
             if u in face:
                 for corner in face:
-                    self.around[corner].discard(k)
+                    self.triangles_at[corner].discard(k)
                 self.faces[k] = None
             else:
                 self.faces[k] = tuple(u if i == v else i for i in face)  # type: ignore[assignment]
-                self.around[u].add(k)
-        self.around[v] = set()
+                self.triangles_at[u].add(k)
+        self.triangles_at[v] = set()
         if v in self.rim:
             for end in self.rim.pop(v) - {u}:
                 self.rim[end] = (self.rim[end] - {v}) | {u}

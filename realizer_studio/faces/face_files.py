@@ -47,7 +47,7 @@ def write_mesh(
     Args:
         vertices: (n, 3) metres; triangles: (m, 3); colours: (n, 3) sRGB 0..255.
         occlusion, gloss: (n,) 0..1.
-        more: further arrays, as they are.
+        more: further arrays, stored unchanged.
     """
     np.savez_compressed(
         path,
@@ -73,9 +73,9 @@ def write_fields(
 
     Args:
         rows: number of a FAP or a row of the basis -> (n, 3).
-        head: (n,) uint8, how far each vertex turns with the head.
+        head: (n,) uint8, the share of the head's rotation for each vertex.
         jaw_pivot, head_pivot: (3,) metres; eyes: centres of the left and the right eyeball.
-        lids: vertices that slide over the eyeballs, which eyeball, and least distance (`rigid.sliding`).
+        lids: vertices that slide over the eyeballs, the eyeball's index, and the radius (`rigid.sliding`).
     """
     vertex, eye, radius = lids
     np.savez_compressed(

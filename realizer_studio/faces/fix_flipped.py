@@ -22,22 +22,21 @@ from realizer.tables import faps
 from realizer_studio.faces.mpeg4.fap_limits import OPEN_JAW, ROLLED, accompanying_faps, required_range
 
 ROUNDS = 60
-PASSES = 6  # repaired neighbours change the limits of a field
-STILL = 1e-4
-SHARE = 0.5  # of the way to the mean of the triangles that turn over, each round
+PASSES = 6  # repairs of neighbouring fields interact
+MIN_STEP = 1e-4
+SHARE = 0.5  # of the difference from the mean of the flipped triangles, removed in each round
 
-
-# The lips' fields add up to one along a lip, so what softens one of them has to soften all.
+# The fields of the lips add up to one along a lip, so they are softened together.
 LIPS = frozenset({*range(4, 14), *range(51, 61), 16, 17})
 JAW = (JAW_COS + 1, JAW_SIN + 1, JAW_DROP + 1)
 
 
 def flipped_triangles(rest: Float64, now: Float64, triangles: Int32, cosine: float = 0.0) -> Bool:
-    """Return which triangles (m,) have turned past the angle of this cosine since rest."""
+    """Return which triangles (m,) have turned by more than the angle with this cosine."""
     before, after = triangle_normals(rest, triangles), triangle_normals(now, triangles)
     sizes = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    away: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
-    return away
+    flipped: Bool = np.asarray((before * after).sum(axis=1) < cosine * sizes)
+    return flipped
 
 
 def soften_flips(
@@ -47,13 +46,13 @@ def soften_flips(
     plays: Sequence[tuple[Float64, Any, float]],
     fixed: Collection[int],
 ) -> Float64:
-    """Return the fields, softened together around the triangles that they flip, until none is flipped.
+    """Return fields that flip no triangle: they are softened together around flipped triangles.
 
     Args:
         fields: (g, n, 3) metres per metre of FAP; at: (n, 3) metres; triangles: (m, 3).
-        plays: (g,) metres (signed) by which the fields are played, each with what moves along then,
-            (n, 3), and the cosine of the turn that counts.
-        fixed: vertices that keep their move.
+        plays: amounts (g,) of the fields in metres, signed; the displacement (n, 3) that accompanies them;
+            and the cosine of the angle at which a triangle counts as flipped.
+        fixed: vertices that keep their displacement.
     """
     out = fields.copy()
     free = np.ones(len(at), bool)
@@ -70,9 +69,9 @@ def soften_flips(
                 break
             watched = list(plays)
             continue
-        # What flips nothing is looked at again when nothing else does.
-        watched = [play for play, mine in zip(watched, flipped, strict=True) if mine.any()]
-        # A triangle that moves as one cannot turn over.
+        # Combinations without flips are checked again when no others are left.
+        watched = [play for play, flips in zip(watched, flipped, strict=True) if flips.any()]
+        # A triangle whose corners move alike does not turn.
         corners = triangles[bad]
         count = np.bincount(corners.ravel(), minlength=len(at))
         loose = np.flatnonzero((count > 0) & free)
@@ -81,7 +80,7 @@ def soften_flips(
             pulled = np.zeros_like(at)
             np.add.at(pulled, corners.ravel(), np.repeat(field[corners].mean(axis=1), 3, axis=0))
             step[k] = SHARE * (pulled[loose] / count[loose, None] - field[loose])
-        if np.abs(step).max(initial=0.0) < STILL:
+        if np.abs(step).max(initial=0.0) < MIN_STEP:
             break  # the remaining flips come from coupled movement
         out[:, loose] += step
     return out
@@ -96,14 +95,14 @@ def without_flips(
     pivot: Float64,
     twin: Int32,
 ) -> dict[int, Float64]:
-    """Return fields of FAPs that flip no triangle; feature points keep their movement.
+    """Return fields of FAPs that flip no triangle; feature points keep their displacement.
 
-    Each is played as far as a face must bear, with the contour of the lips that it drags along or that goes
-    with it, and with all that the action unit asks for that asks most of it.
+    Each FAP is tried at its required range, with the coupled contour of the lips, and with the other FAPs of
+    the action unit that uses it most.
 
     Args:
         fields: row number (`basis`) -> (n, 3); at: (n, 3) metres; triangles: (m, 3).
-        points: feature point -> vertex; pivot: (3,), where the jaw turns.
+        points: feature point -> vertex; pivot: (3,), of the jaw.
         twin: (n,) each vertex's mirror image, or the vertex itself.
     """
     out = {number: np.array(field, np.float64) for number, field in fields.items()}
@@ -114,31 +113,31 @@ def without_flips(
     fixed = np.zeros(len(at), bool)
     fixed[list(points.values())] = True
     for _ in range(PASSES):
-        for asked_by, mended in _groups(out):
-            mine = np.any([np.abs(out[n]).any(axis=1) for n in mended], axis=0)
-            near = triangles[mine[triangles].any(axis=1)]
-            if not len(near):
+        for requested, mended in _groups(out):
+            moving = np.any([np.abs(out[n]).any(axis=1) for n in mended], axis=0)
+            region = triangles[moving[triangles].any(axis=1)]
+            if not len(region):
                 continue
-            here, local = np.unique(near, return_inverse=True)
+            vertices, local = np.unique(region, return_inverse=True)
             rest = sorted(set(out) - set(mended))
-            fixed_fields = np.stack([out[n][here] for n in rest])
+            fixed_fields = np.stack([out[n][vertices] for n in rest])
             plays = []
-            for values, cosine in _played(asked_by, contours):
+            for values, cosine in _played(requested, contours):
                 metres = _metres(values, fapu, chin)
-                along = np.tensordot(metres[np.array(rest) - 1], fixed_fields, 1)
-                plays.append((metres[np.array(mended) - 1], along, cosine))
+                accompanying = np.tensordot(metres[np.array(rest) - 1], fixed_fields, 1)
+                plays.append((metres[np.array(mended) - 1], accompanying, cosine))
             soft = soften_flips(
-                np.stack([out[n][here] for n in mended]),
-                at[here], local.reshape(near.shape), plays, np.flatnonzero(fixed[here]).tolist(),
+                np.stack([out[n][vertices] for n in mended]),
+                at[vertices], local.reshape(region.shape), plays, np.flatnonzero(fixed[vertices]).tolist(),
             )  # fmt: skip
             for number, field in zip(mended, soft, strict=True):
-                out[number][here] = field
+                out[number][vertices] = field
         out = symmetrize(out, twin)
     return out
 
 
 def _groups(fields: Mapping[int, Float64]) -> list[tuple[list[int], list[int]]]:
-    """Return FAPs to play, each with the rows to soften together: a FAP and its twin, all lips, the jaw."""
+    """Return groups of FAPs to try, with the fields to soften together: a pair, all lips, the jaw."""
     table = faps()
     left = [n for n in sorted(fields) if n <= FAPS and n not in LIPS]
     pairs = sorted({tuple(sorted({n, table[n - 1].mirror})) for n in left})
@@ -149,7 +148,7 @@ def _groups(fields: Mapping[int, Float64]) -> list[tuple[list[int], list[int]]]:
 
 
 def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, float]]:
-    """Return FAP values (68,) that each of the FAPs must support, with the cosine of the turn that counts."""
+    """Return FAP values (68,) that each of the FAPs must support, and the cosine of a flip."""
     table, out = faps(), []
     partner = {**CONTOURS, **{outer: inner for inner, outer in CONTOURS.items()}}
     for number in numbers:
@@ -165,7 +164,7 @@ def _played(numbers: Sequence[int], contours: Contours) -> list[tuple[Float32, f
 
 
 def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
-    """Return the factors (141,) of the rows for FAP values (68,)."""
+    """Return the amount of each field (141,) for FAP values (68,)."""
     out = np.zeros(ROWS)
     out[:FAPS] = values * [fapu.metres(row.unit) for row in faps()]
     turn, slid = jaw_pose({"chin": chin}, out[OPEN_JAW - 1])
@@ -175,11 +174,11 @@ def _metres(values: Float32, fapu: Fapu, chin: Float64) -> Float64:
 
 
 def symmetrize(fields: Mapping[int, Float64], twin: Int32) -> dict[int, Float64]:
-    """Return symmetric fields: each is the mean of itself and its twin's mirror image."""
+    """Return symmetric fields, each the mean of itself and the mirror image of the other side's field."""
     table, flip = faps(), np.array([-1.0, 1.0, 1.0])
     out = {}
     for number, field in fields.items():
-        place, fap = divmod(number - 1, BEYOND)
+        block, fap = divmod(number - 1, BEYOND)
         mirror, sign = (table[fap].mirror, table[fap].sign) if fap < FAPS else (number, 1)
-        out[number] = (field + sign * fields[place * BEYOND + mirror][twin] * flip) / 2
+        out[number] = (field + sign * fields[block * BEYOND + mirror][twin] * flip) / 2
     return out

@@ -16,7 +16,7 @@ SLIVER = 1e-6  # of the height of a cut
 
 @dataclass(frozen=True, eq=False)
 class Submesh:
-    """A surface that is made from the base mesh."""
+    """A surface whose vertices are linear combinations of the base mesh's."""
 
     # (n, n_base) sparse; vertices = mix @ base vertices + offset, and displacements likewise.
     mix: sp.csr_matrix
@@ -36,7 +36,7 @@ class Submesh:
         return int(self.mix.shape[0])
 
     def sources(self) -> Int32:
-        """Return the base vertex that each vertex is equal to, (n,); -1 for combinations of several."""
+        """Return the base vertex that each vertex equals, (n,); -1 for combinations of several."""
         first = self.mix.indices[self.mix.indptr[:-1]]
         return np.where(np.diff(self.mix.indptr) == 1, first, -1).astype(np.int32)
 
@@ -60,7 +60,7 @@ class Submesh:
 
     def clipped(self, height: Float64) -> tuple[Submesh, sp.csr_matrix]:
         """Return the part of the surface with `height` (n,) above zero, and its mix of vertices."""
-        # A cut very close to a vertex would leave slivers, so it passes through the vertex.
+        # A cut very close to a vertex would leave slivers, so such cuts pass through the vertex.
         height = np.where(np.abs(height) < SLIVER, SLIVER, height)
         inside = height > 0
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
@@ -90,12 +90,12 @@ class Submesh:
         return self.mixed(mix, inverse.reshape(-1, 3)), mix
 
     def threaded(self, loops: list[list[int]]) -> Submesh:
-        """Return the surface with one more vertex on every edge of closed loops, which makes them smoother.
+        """Return the surface with the edges of closed loops subdivided, which makes the loops smoother.
 
-        Each new vertex is made from four points (Dyn, Levin and Gregory 1987).
+        Each new vertex is a combination of four points (Dyn, Levin and Gregory 1987).
 
         Args:
-            loops: vertices of each loop; loops must not share vertices.
+            loops: the vertices of each loop; no vertex is in two loops.
         """
         middle: dict[tuple[int, int], int] = {}
         rows: list[dict[int, float]] = [{i: 1.0} for i in range(len(self))]
@@ -120,10 +120,10 @@ class Submesh:
 
 
 def mix_of(rows: Sequence[Mapping[int, float]], n: int) -> sp.csr_matrix:
-    """Return the sparse matrix (len(rows), n) of rows that map columns to shares."""
+    """Return the sparse matrix (len(rows), n) of rows that map columns to values."""
     shares = [share for row in rows for share in row.values()]
-    places = [i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]
-    return sp.csr_matrix((shares, places), (len(rows), n))
+    indices = [i for i, row in enumerate(rows) for _ in row], [j for row in rows for j in row]
+    return sp.csr_matrix((shares, indices), (len(rows), n))
 
 
 @dataclass(eq=False)
@@ -137,18 +137,18 @@ class Part:
     colours: Float64  # (n, 3) sRGB 0..255
     gloss: Float64  # (n,) 0..1
     occlusion: Float64 | None = None  # (n,) 0..1, or None: to be baked
-    # Row number -> (n, 3), where the part brings its own.
+    # Row number -> (n, 3), fields that do not come from the base mesh.
     fields: dict[int, Float64] = field(default_factory=dict)
-    uv: Float64 | None = None  # (n, 2) places in the maps, or None: it has none of its own
+    uv: Float64 | None = None  # (n, 2) texture coordinates, or None: the part has none
 
     @property
     def submesh(self) -> Submesh:
-        """The patch of a part that comes from the base mesh."""
+        """The submesh of a part that comes from the base mesh."""
         assert self.patch is not None
         return self.patch
 
     def subset(self, index: Any, triangles: Int32) -> Part:
-        """Return the part with only these of its vertices, (k,) indices, and other triangles over them."""
+        """Return the part with the vertices of (k,) indices, and other triangles over them."""
         patch = self.patch and Submesh(self.patch.mix[index], self.patch.offset[index], triangles)
         light = None if self.occlusion is None else self.occlusion[index]
         fields = {number: moves[index] for number, moves in self.fields.items()}
@@ -159,6 +159,6 @@ class Part:
 
 
 def smooth(x: Any, low: Any, high: Any) -> Any:
-    """Return 0 below low, 1 above high, smooth between (Perlin's cubic); falls where high < low."""
+    """Return Perlin's cubic step: 0 below low, 1 above high; descending if high < low."""
     t = np.clip((np.asarray(x, float) - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)

@@ -17,10 +17,10 @@ from realizer.face.mesh_geometry import nearest_vertex
 from realizer.face.reading import read_arrays
 from realizer.tables import action_units, csv_rows, faps
 from realizer_studio.faces.mpeg4 import rigid
-from realizer_studio.faces.mpeg4.build import grown, setup_of
+from realizer_studio.faces.mpeg4.build import bind_to_skin, setup_of
 from realizer_studio.faces.mpeg4.defaults import default_setup
 from realizer_studio.faces.mpeg4.fap_limits import usual_range
-from realizer_studio.faces.mpeg4.fields import WAYS, pairs
+from realizer_studio.faces.mpeg4.fields import DIRECTIONS, pairs
 from realizer_studio.faces.mpeg4.landmarks import PUPILS, TEETH, template
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup, setup_table
 from realizer_studio.faces.mpeg4.zones import Setup, mirrorable
@@ -62,7 +62,7 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         "fapu": {unit: face.fapu.metres(unit) for unit in ("MNS", "MW", "ENS", "ES", "IRISD")},
         **_tables(),
     }
-    vertex, near, share = grown(at, parts)
+    vertex, near, share = bind_to_skin(at, parts)
     arrays = {
         "vertices": face.vertices, "triangles": face.triangles.astype(np.uint32),
         "grown": vertex.astype(np.uint32), "near": near.astype(np.uint32) + parts["skin"][0], "share": share,
@@ -86,7 +86,7 @@ def _tables() -> dict[str, Any]:
         {
             "fap": row.fap, "name": row.name, "unit": row.unit, "point": row.feature_point,
             "mirror": row.mirror, "sign": row.sign, "least": row.least, "most": row.most,
-            "way": WAYS.get(row.direction),
+            "way": DIRECTIONS.get(row.direction),
             "usual": [-usual_range(row.fap, -1) if row.least < 0 else 0, usual_range(row.fap, 1)],
         }
         for row in faps()[2:]

@@ -15,7 +15,7 @@ from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import half_edges, neighbour_mean
 from realizer.tables import faps
 from realizer_studio.faces.arkit.mouth import Mouth
-from realizer_studio.faces.mpeg4.fields import WAYS
+from realizer_studio.faces.mpeg4.fields import DIRECTIONS
 from realizer_studio.faces.mpeg4.zones import Triple
 from realizer_studio.faces.parts import smooth
 
@@ -88,7 +88,7 @@ class ShapedSkin:
         """Return the field scaled to 1 along the FAP at its point, or None if it points elsewhere."""
         row = faps()[fap - 1]
         here = field[self.vertex[row.feature_point]]
-        along = float(here @ np.array(WAYS[row.direction]))
+        along = float(here @ np.array(DIRECTIONS[row.direction]))
         if along < least * float(np.linalg.norm(field, axis=1).max(initial=1e-12)):
             return None
         return field / along
@@ -126,7 +126,7 @@ def _line(
 ) -> dict[int, Float64 | None]:
     """Return a shape divided among the points of a lip."""
     mouth, height = shaped.mouth, np.zeros((2, 5))
-    way = np.array(WAYS[faps()[min(line) - 1].direction])
+    way = np.array(DIRECTIONS[faps()[min(line) - 1].direction])
     for name, knot, outer in line.values():
         height[outer, knot] = -float(move[shaped.vertex[name]] @ way)
     most = height.max()

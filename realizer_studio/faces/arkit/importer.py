@@ -26,7 +26,7 @@ from realizer_studio.faces.arkit.part_classifier import ball_behind
 from realizer_studio.faces.arkit.points import points_of
 from realizer_studio.faces.au.measure import OPEN, UnitMeasurement, write_shapes
 from realizer_studio.faces.face_files import write_fields, write_head, write_mesh
-from realizer_studio.faces.mpeg4.build import apply_zones, with_brows
+from realizer_studio.faces.mpeg4.build import apply_zones, extend_field
 from realizer_studio.faces.mpeg4.defaults import default_setup, split_sides
 from realizer_studio.faces.mpeg4.rigid import opening_rows, sliding
 from realizer_studio.faces.parts import smooth
@@ -164,7 +164,7 @@ def _write_fields(
     made = shape_fields(shaped)
     words = _jaw(shaped, surface, ranges, rows, stored, points, made)
     for fap, field in made.items():
-        rows[fap] = with_brows(at, ranges, field, rows[fap])
+        rows[fap] = extend_field(at, ranges, field, rows[fap])
     if head.painted:
         rows |= _gaze_rows(surface, ranges)
     fit = ball_behind if head.painted else fit_ball
@@ -223,7 +223,7 @@ def _jaw(
         for part in ("lower_teeth", "tongue"):
             if part in ranges:
                 opens[slice(*ranges[part])] = 1
-        opens = with_brows(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
+        opens = extend_field(surface.vertices, ranges, opens[first:last, None], opens[:, None])[:, 0]
         rows |= opening_rows(surface.vertices, pivot, opens)
     thrust = shaped.move("jawForward")
     aside = shaped.move("jawRight", "jawLeft")

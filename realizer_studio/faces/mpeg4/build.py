@@ -33,14 +33,14 @@ FILES = (
 )  # fmt: skip
 
 GROWN = ("brows", "lashes", "beard")  # parts that lie on the skin and follow it
-NEAR = 3  # vertices of the skin that one of theirs follows
+NEAR = 3  # vertices of the skin that one of their vertices follows
 PUPILS = {"3.5", "3.6"}  # points that lie on no skin
 
 
 def copy_with_zones(
     source: Path, folder: Path, parameters: Path | None = None, only: Collection[int] = ()
 ) -> tuple[Setup, tuple[str, ...]]:
-    """Build another face of the same head, moved by zones; missing feature points are located.
+    """Copy a face folder and build the copy's fields from zones; missing feature points are located.
 
     Args:
         source: a face folder; folder: the new one, whose name becomes the face's.
@@ -49,7 +49,7 @@ def copy_with_zones(
         only: as for `apply_zones`.
 
     Returns:
-        The parameters, which the new folder's mpeg4.toml holds too, and the feature points that are guesses.
+        The parameters, as written to the new folder's mpeg4.toml, and the feature points that are guesses.
 
     Raises:
         FaceError: the source or the parameters are broken.
@@ -59,11 +59,11 @@ def copy_with_zones(
     for file in FILES:
         if (source / file).is_file() and source.resolve() != folder.resolve():
             shutil.copy(source / file, folder / file)
-    guesses = () if (folder / "features.csv").is_file() else _mark(folder)
+    guesses = () if (folder / "features.csv").is_file() else _write_points(folder)
     head = (folder / "face.toml").read_text("utf-8")
     (folder / "face.toml").write_text(head.replace(f'name = "{name}"', f'name = "{folder.name}"', 1), "utf-8")
     if parameters is not None and parameters.suffix.lower() == ".xml":
-        points = _read(folder)[3]
+        points = _read_folder(folder)[3]
         write_setup(folder / FILE, fitted(read_faceeditor(parameters), points))
     elif parameters is not None and parameters.resolve() != (folder / FILE).resolve():
         shutil.copy(parameters, folder / FILE)
@@ -73,24 +73,24 @@ def copy_with_zones(
     return setup, guesses
 
 
-def _mark(folder: Path) -> tuple[str, ...]:
-    """Find the feature points and write features.csv; which of them are guesses."""
-    at, mesh, parts = _head(folder)
+def _write_points(folder: Path) -> tuple[str, ...]:
+    """Find the feature points, write features.csv, and return the points that are guesses."""
+    at, mesh, parts = _read_mesh(folder)
     points, guesses = find_points(at, np.asarray(mesh["triangles"], np.int32), parts)
     write_features(folder / "features.csv", points)
     return guesses
 
 
 def setup_of(folder: Path) -> Setup:
-    """Return the parameters of a face folder: its mpeg4.toml, or computed from mesh and points.
+    """Return the parameters of a face folder, from its mpeg4.toml or computed from mesh and points.
 
     Raises:
         FaceError: a file is missing or broken, or the points are.
     """
-    at, mesh, parts, points = _read(folder)
+    at, mesh, parts, points = _read_folder(folder)
     if (folder / FILE).is_file():
         setup = read_setup(folder / FILE)
-        # Twins of vertices of the skin are of the skin.
+        # Masks are mirrored among the vertices of the skin.
         return synchronised(replace(setup, points=points | dict(setup.points)), at[: parts["skin"][1]])
     return default_setup(at, np.asarray(mesh["triangles"], np.int32), points, parts["skin"])
 
@@ -99,14 +99,14 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
     """Write fields.npz.
 
     Args:
-        folder: has face.toml, mesh.npz and features.csv; fields.npz too where only some FAPs are changed.
-        only: FAPs whose fields are replaced; the others stay. If empty, all fields are built anew, also
-            the jaw, the tongue, the eyeballs, the pupils and the neck.
+        folder: has face.toml, mesh.npz and features.csv; with `only`, also fields.npz.
+        only: FAPs whose fields are replaced; the others stay. If empty, all fields are built, including
+            those of jaw, tongue, eyeballs, pupils and neck.
 
     Raises:
         FaceError: a file or a zone is broken, or a FAP of `only` has no zone.
     """
-    at, mesh, parts, points = _read(folder)
+    at, mesh, parts, points = _read_folder(folder)
     path = folder / "fields.npz"
     skin = slice(*parts["skin"])
     chosen = {fap: zone for fap, zone in setup.zones.items() if not only or fap in only}
@@ -117,14 +117,16 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
         )
     if faults := mask_faults(setup, parts["skin"]):
         raise FaceError(faults[0])
-    # Masks count from the first vertex of the skin there.
-    whole = replace(setup, masks={fap: mask - skin.start for fap, mask in setup.masks.items()})
-    made = _softened(zone_fields(whole, at[skin]), whole, at[skin], mesh["triangles"], parts["skin"])
-    rows = {fap: with_brows(at, parts, made[fap], np.zeros_like(at)) for fap in chosen}
+    # The fields are computed for the skin alone, so its masks count from its first vertex.
+    skin_setup = replace(setup, masks={fap: mask - skin.start for fap, mask in setup.masks.items()})
+    skin_fields = _smoothed(
+        zone_fields(skin_setup, at[skin]), skin_setup, at[skin], mesh["triangles"], parts["skin"]
+    )
+    rows = {fap: extend_field(at, parts, skin_fields[fap], np.zeros_like(at)) for fap in chosen}
     if only:
         stored = read_arrays(path, ARRAYS)
-        own = unpack(stored, len(at))
-        rows = {number: row for number, row in own.items() if number - BEYOND not in chosen} | rows
+        stored_rows = unpack(stored, len(at))
+        rows = {number: row for number, row in stored_rows.items() if number - BEYOND not in chosen} | rows
         eyes = [
             (centre, radius)
             for (_, radius), centre in zip(rigid.balls(at, parts), stored["eye_centre"], strict=True)
@@ -144,12 +146,12 @@ def apply_zones(folder: Path, setup: Setup, only: Collection[int] = ()) -> None:
     write_fields(path, rows, head, jaw, pivot, centres, rigid.sliding(rows, at, parts, eyes))
 
 
-def _read(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]], dict[str, Any]]:
+def _read_folder(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]], dict[str, Any]]:
     points = {name: point.place for name, point in read_features(folder / "features.csv").items()}
-    return *_head(folder), points
+    return *_read_mesh(folder), points
 
 
-def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
+def _read_mesh(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
     head = read_head(folder)
     mesh = read_arrays(folder / "mesh.npz", MESH)
     parts = {name: (int(a), int(b)) for name, (a, b) in head["parts"].items()}
@@ -163,40 +165,40 @@ def _head(folder: Path) -> tuple[Float64, Any, dict[str, tuple[int, int]]]:
     return at, mesh, parts
 
 
-def _softened(
+def _smoothed(
     fields: Mapping[int, Float64], setup: Setup, at: Float64, triangles: Any, skin: tuple[int, int]
 ) -> dict[int, Float64]:
-    """Return smoother fields: half a vertex's own move, half the mean of its neighbours'.
+    """Return smoothed fields: the mean of each vertex's displacement and its neighbours' average.
 
-    Feature points keep their full movement, so that they still follow their FAPs.
+    Feature points keep their displacement, so that they still follow their FAPs.
     """
-    mean = neighbour_mean(len(at), half_edges(part_triangles(triangles, skin)), own=False)
+    average = neighbour_mean(len(at), half_edges(part_triangles(triangles, skin)), own=False)
     ends = {faps()[fap - 1].feature_point for fap in fields} - PUPILS
     fixed = [int(np.argmin(np.linalg.norm(at - np.array(setup.points[name]), axis=1))) for name in ends]
-    out = {}
+    smoothed = {}
     for fap, field in fields.items():
-        out[fap] = 0.5 * field + 0.5 * np.asarray(mean @ field)
-        out[fap][fixed] = field[fixed]
-    return out
+        smoothed[fap] = 0.5 * field + 0.5 * np.asarray(average @ field)
+        smoothed[fap][fixed] = field[fixed]
+    return smoothed
 
 
-def with_brows(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
-    """Return a row (n, k) with a field of the skin; what grows on the skin follows it, other parts stay."""
+def extend_field(at: Float64, parts: Mapping[str, tuple[int, int]], field: Float64, row: Float64) -> Float64:
+    """Return `row` (n, k) with the skin's field for the skin and for the parts that grow on it."""
     out = np.array(row)
     out[slice(*parts["skin"])] = field
-    vertex, near, share = grown(at, parts)
-    out[vertex] = (field[near] * share[..., None]).sum(axis=1)
+    vertex, nearest, weight = bind_to_skin(at, parts)
+    out[vertex] = (field[nearest] * weight[..., None]).sum(axis=1)
     return out
 
 
-def grown(at: Float64, parts: Mapping[str, tuple[int, int]]) -> tuple[Any, Any, Float64]:
-    """Return vertices (k,) that grow on the skin, the skin's vertices (k, 3) they follow, and the shares.
+def bind_to_skin(at: Float64, parts: Mapping[str, tuple[int, int]]) -> tuple[Any, Any, Float64]:
+    """Return vertices (k,) of hair parts, the skin's vertices (k, 3) that they follow, and their weights.
 
-    The skin's vertices are counted from its first.
+    The skin's vertices are counted from its first vertex.
     """
     from scipy.spatial import cKDTree
 
     vertex = np.concatenate([np.zeros(0, int), *(np.arange(*parts[name]) for name in GROWN if name in parts)])
-    off, near = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
-    share = 1 / np.maximum(off, 1e-5)
-    return vertex, near, share / np.maximum(share.sum(axis=1, keepdims=True), 1e-30)
+    distance, nearest = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
+    weight = 1 / np.maximum(distance, 1e-5)
+    return vertex, nearest, weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-30)

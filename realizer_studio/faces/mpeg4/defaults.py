@@ -13,7 +13,7 @@ from realizer.face.mesh_geometry import edge_graph, half_edges, part_triangles
 from realizer.tables import csv_rows, faps
 from realizer_studio.faces.mpeg4.zones import Setup, Triple, Zone
 
-# The FAPs on one side of the slit between lips or lids, and those on the other.
+# The feature points above the slit between lips or lids, and those below it.
 SLITS = {
     "upper_lip": (("8.1", "8.5", "8.6", "2.2", "2.6", "2.7"), ("8.2", "8.7", "8.8", "2.3", "2.8", "2.9")),
     "upper_lid_left": (("3.1", "3.13"), ("3.3", "3.9")),
@@ -71,9 +71,9 @@ def default_setup(
 
 
 def _zone(row: _Default, points: Mapping[str, Triple]) -> Zone:
-    a, b = _place(points, row.from_point), _place(points, row.to_point)
-    about = [_place(points, name) for name in row.about.split()]
-    pivot = np.mean(about, axis=0) if about else np.zeros(3)
+    a, b = _position(points, row.from_point), _position(points, row.to_point)
+    pivots = [_position(points, name) for name in row.about.split()]
+    pivot = np.mean(pivots, axis=0) if pivots else np.zeros(3)
     return Zone(
         fap=row.fap,
         falloff=row.falloff,
@@ -87,7 +87,7 @@ def _zone(row: _Default, points: Mapping[str, Triple]) -> Zone:
     )
 
 
-def _place(points: Mapping[str, Triple], name: str) -> Float64:
+def _position(points: Mapping[str, Triple], name: str) -> Float64:
     if name not in points:
         raise FaceError(f"feature point {name} is missing: the default zones need it; add it")
     return np.asarray(points[name], np.float64)
@@ -96,7 +96,9 @@ def _place(points: Mapping[str, Triple], name: str) -> Float64:
 def split_sides(
     vertices: Float64, triangles: Int32, points: Mapping[str, Triple], skin: tuple[int, int]
 ) -> dict[str, Int32]:
-    """Return the skin's vertices that belong to upper and lower lip and lids, by distance over the skin.
+    """Divide the skin's vertices between upper and lower lip, and upper and lower lids.
+
+    A vertex belongs to the side whose feature points are nearer, measured over the skin.
 
     Returns:
         upper_lip, lower_lip, upper_lid_left, lower_lid_left, upper_lid_right, lower_lid_right -> vertices.
@@ -105,27 +107,29 @@ def split_sides(
     graph = _graph(vertices, triangles, skin)
     at = vertices[slice(*skin)]
     for name, (above, below) in SLITS.items():
-        up, down = (_ways(graph, at, [_place(points, p) for p in group]) for group in (above, below))
-        upper: Bool = up <= down
+        to_upper, to_lower = (
+            _surface_distance(graph, at, [_position(points, p) for p in group]) for group in (above, below)
+        )
+        upper: Bool = to_upper <= to_lower
         out[name] = (np.flatnonzero(upper) + skin[0]).astype(np.int32)
         out[name.replace("upper", "lower")] = (np.flatnonzero(~upper) + skin[0]).astype(np.int32)
     return out
 
 
 def _graph(vertices: Float64, triangles: Int32, skin: tuple[int, int]) -> Any:
-    """Return the lengths of the skin's edges, sparse; vertices at one place are joined."""
+    """Return the sparse graph of the skin's edges and their lengths; doubled vertices are connected."""
     at = vertices[slice(*skin)]
-    # Seams double vertices (one for each side's texture): a hair's length joins them.
-    _, place = np.unique(np.round(at, 6), axis=0, return_inverse=True)
-    order = np.argsort(place.ravel(), kind="stable")
-    same = np.flatnonzero(np.diff(place.ravel()[order]) == 0)
-    seams = np.stack([order[same], order[same + 1]], 1)
+    # A texture seam doubles its vertices: an edge connects the two of each pair.
+    _, group = np.unique(np.round(at, 6), axis=0, return_inverse=True)
+    order = np.argsort(group.ravel(), kind="stable")
+    doubled = np.flatnonzero(np.diff(group.ravel()[order]) == 0)
+    seams = np.stack([order[doubled], order[doubled + 1]], 1)
     return edge_graph(at, np.concatenate([half_edges(part_triangles(triangles, skin)), seams]))
 
 
-def _ways(graph: Any, at: Float64, places: list[Float64]) -> Float64:
-    """Return the distance (skin,) over the skin in metres to the nearest of the places."""
+def _surface_distance(graph: Any, at: Float64, targets: list[Float64]) -> Float64:
+    """Return each vertex's distance over the skin to the nearest target, (skin,) metres."""
     from scipy.sparse.csgraph import dijkstra
 
-    sources = [int(np.argmin(np.linalg.norm(at - place, axis=1))) for place in places]
+    sources = [int(np.argmin(np.linalg.norm(at - target, axis=1))) for target in targets]
     return np.asarray(dijkstra(graph, directed=False, indices=sources, min_only=True), np.float64)

@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 ROOT = "faceeditor-parameters"
 CHILDREN = ("fp-positions", "keep-syncs", "deformers", "vertex-masks")
-PLACE = ("x", "y", "z")
-ZONE = (*PLACE, "fap", "size", "scalex", "scaley", "scalez", "use-vertex-mask", "invert-vertex-mask")
+AXES = ("x", "y", "z")
+ZONE = (*AXES, "fap", "size", "scalex", "scaley", "scalez", "use-vertex-mask", "invert-vertex-mask")
 ATTRIBUTES = {
     "ease-deformer": (*ZONE, "ease"),
     "smooth-deformer": (*ZONE, "smooth-center", "smooth-side"),
-    "deformer": (*PLACE, "fap"),
+    "deformer": (*AXES, "fap"),
 }
 # A raised cosine is this Bezier curve within half a percent: percent, and the share of the size.
 AS_SMOOTH, AS_SIZE = 57.28, 0.63581
@@ -37,7 +37,7 @@ LARGEST = 16 * 2**20  # bytes
 
 
 def read_faceeditor(path: Path) -> Setup:
-    """Read the parameters of a FaceEditor file, in its own coordinates; `fitted` converts them to a face's.
+    """Read the parameters of a FaceEditor file, in the file's coordinates; `fitted` converts them.
 
     Raises:
         FaceError: no such file, not XML, or an element or attribute that is missing, unknown or no number.
@@ -54,29 +54,29 @@ def read_faceeditor(path: Path) -> Setup:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:  # ValueError: of encodings
         raise FaceError(f"{path}: wanted well-formed XML, got: {error}") from None
-    found = tuple(child.tag for child in root)
-    if root.tag != ROOT or found != CHILDREN:
+    tags = tuple(child.tag for child in root)
+    if root.tag != ROOT or tags != CHILDREN:
         raise FaceError(
             f"{path}: wanted <{ROOT}> with {', '.join(CHILDREN)} once each and in order; got <{root.tag}> "
-            f"with {', '.join(found) or 'nothing'}"
+            f"with {', '.join(tags) or 'nothing'}"
         )
     positions, syncs, deformers, masks = root
     points: dict[str, Triple] = {}
     for element in positions:
-        got = _attributes(path, element, "fp-position", ("fp", *PLACE))
-        points[got["fp"]] = _place(path, element)
+        attributes = _attributes(path, element, "fp-position", ("fp", *AXES))
+        points[attributes["fp"]] = _position(path, element)
     zones: dict[int, Zone] = {}
-    whole = set()
+    rigid = set()
     for element in deformers:
         if element.tag not in ATTRIBUTES:
             raise FaceError(f"{path}: deformers: wanted {', '.join(ATTRIBUTES)}; got <{element.tag}>")
         _attributes(path, element, element.tag, ATTRIBUTES[element.tag])
         fap = _fap(path, element, element.get("fap"))
-        if fap in zones or fap in whole:
+        if fap in zones or fap in rigid:
             raise FaceError(f"{path}: FAP {fap} has two deformers; delete one")
-        points.setdefault(faps()[fap - 1].feature_point, _place(path, element))
+        points.setdefault(faps()[fap - 1].feature_point, _position(path, element))
         if element.tag == "deformer":
-            whole.add(fap)
+            rigid.add(fap)
         else:
             zones[fap] = _zone(path, element, fap)
     vertices = {}
@@ -88,14 +88,14 @@ def read_faceeditor(path: Path) -> Setup:
         mask = np.unique(np.array(words, np.int64)).astype(np.int32)
         vertices[_fap(path, element, element.get("fap"))] = mask
     synced = frozenset(_fap(path, syncs, word) for word in (syncs.text or "").split())
-    return Setup(points, zones, vertices, synced, whole=frozenset(whole))
+    return Setup(points, zones, vertices, synced, rigid=frozenset(rigid))
 
 
 def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
     """Write a FaceEditor file.
 
     Returns:
-        What the format cannot express, a sentence each.
+        A sentence for each property that the format cannot express.
     """
     from xml.sax.saxutils import quoteattr
 
@@ -103,28 +103,28 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
         inside = "".join(f" {key}={quoteattr(str(value).lower())}" for key, value in values.items())
         return f"{'  ' * depth}<{tag}{inside}{'/>' if closed else '>'}"
 
-    lost = []
+    losses = []
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', _doctype(), f"<{ROOT}>", "  <fp-positions>"]
     lines += [
-        line(2, "fp-position", {"fp": name, **dict(zip(PLACE, place, strict=True))})
-        for name, place in setup.points.items()
+        line(2, "fp-position", {"fp": name, **dict(zip(AXES, position, strict=True))})
+        for name, position in setup.points.items()
     ]
     lines += ["  </fp-positions>", f"  <keep-syncs>{' '.join(map(str, sorted(setup.synced)))}</keep-syncs>"]
     lines.append("  <deformers>")
-    for fap in sorted({*setup.zones, *setup.whole}):
-        place = setup.points.get(faps()[fap - 1].feature_point, (0.0, 0.0, 0.0))
-        start = {**dict(zip(PLACE, place, strict=True)), "fap": fap}
-        if fap in setup.whole:
+    for fap in sorted({*setup.zones, *setup.rigid}):
+        position = setup.points.get(faps()[fap - 1].feature_point, (0.0, 0.0, 0.0))
+        start = {**dict(zip(AXES, position, strict=True)), "fap": fap}
+        if fap in setup.rigid:
             lines.append(line(2, "deformer", start))
             continue
         zone = setup.zones[fap]
         if zone.slide or zone.radial:
-            lost.append(f"FAP {fap}: slide and radial: all vertices move straight in FaceEditor")
-        tag, size, rest = _element_of(zone)
+            losses.append(f"FAP {fap}: slide and radial: all vertices move straight in FaceEditor")
+        tag, size, falloff = _element_of(zone)
         x, y, z = zone.scale
         shape = {"size": size, "scalex": x, "scaley": y, "scalez": z}
         use = {"use-vertex-mask": zone.use_mask, "invert-vertex-mask": zone.invert_mask}
-        lines.append(line(2, tag, start | shape | use | rest))
+        lines.append(line(2, tag, start | shape | use | falloff))
     lines += ["  </deformers>", "  <vertex-masks>"]
     lines += [
         f"{line(2, 'vertex-mask', {'fap': fap}, False)}{' '.join(map(str, mask.tolist()))}</vertex-mask>"
@@ -132,14 +132,14 @@ def write_faceeditor(path: Path, setup: Setup) -> tuple[str, ...]:
     ]
     lines += ["  </vertex-masks>", f"</{ROOT}>"]
     path.write_text("\n".join(lines) + "\n", "utf-8")
-    return tuple(lost)
+    return tuple(losses)
 
 
 def fitted(setup: Setup, points: Mapping[str, Triple]) -> Setup:
-    """Return the setup moved and scaled to another face's coordinates, by the points that both have.
+    """Return the setup translated and scaled to a face's coordinates, by the feature points of both.
 
-    FaceEditor's axes are ours, but its x may count to the other side, and its unit is the model's own. Masks
-    stay: they fit the mesh that they were made on, or one whose vertices have the same numbers.
+    FaceEditor's axes are those of this project, but x may be mirrored, and the unit depends on the model.
+    Masks are kept: they are valid for meshes with the same numbering of vertices only.
 
     Raises:
         FaceError: fewer than three points in common, or all in one place.
@@ -149,31 +149,33 @@ def fitted(setup: Setup, points: Mapping[str, Triple]) -> Setup:
         raise FaceError(
             f"wanted at least three feature points that both have, got {', '.join(common) or 'none'}"
         )
-    theirs = np.array([setup.points[name] for name in common], float)
-    ours = np.array([points[name] for name in common], float)
+    source = np.array([setup.points[name] for name in common], float)
+    target = np.array([points[name] for name in common], float)
     best: tuple[float, float, Any, Any] | None = None
     for flip in (np.ones(3), np.array([-1.0, 1.0, 1.0])):
-        a, b = theirs * flip - (theirs * flip).mean(axis=0), ours - ours.mean(axis=0)
-        spread = float((a * a).sum())
-        if spread < 1e-18:
+        a, b = source * flip - (source * flip).mean(axis=0), target - target.mean(axis=0)
+        scatter = float((a * a).sum())
+        if scatter < 1e-18:
             raise FaceError("the feature points in common lie in one place: nothing can be fitted to them")
-        scale = float((a * b).sum()) / spread
-        off = float(((a * scale - b) ** 2).sum())
-        if scale > 0 and (best is None or off < best[0]):
-            best = off, scale, flip, ours.mean(axis=0) - scale * (theirs * flip).mean(axis=0)
+        scale = float((a * b).sum()) / scatter
+        error = float(((a * scale - b) ** 2).sum())
+        if scale > 0 and (best is None or error < best[0]):
+            best = error, scale, flip, target.mean(axis=0) - scale * (source * flip).mean(axis=0)
     if best is None:
         raise FaceError("the feature points in common are exchanged: nothing can be fitted to them")
     _, scale, flip, shift = best
 
-    def moved(place: Triple) -> Triple:
-        x, y, z = (scale * flip * np.array(place) + shift).tolist()
+    def moved(position: Triple) -> Triple:
+        x, y, z = (scale * flip * np.array(position) + shift).tolist()
         return x, y, z
 
     zones = {
         fap: replace(zone, size=zone.size * scale, pivot=moved(zone.pivot) if zone.radial else zone.pivot)
         for fap, zone in setup.zones.items()
     }
-    return replace(setup, zones=zones, points={name: moved(place) for name, place in setup.points.items()})
+    return replace(
+        setup, zones=zones, points={name: moved(position) for name, position in setup.points.items()}
+    )
 
 
 def _element_of(zone: Zone) -> tuple[str, float, dict[str, float]]:
@@ -188,35 +190,35 @@ def _element_of(zone: Zone) -> tuple[str, float, dict[str, float]]:
 
 def _zone(path: Path, element: Element, fap: int) -> Zone:
     size, x, y, z = (_number(path, element, name) for name in ("size", "scalex", "scaley", "scalez"))
-    rest: dict[str, Any] = {
-        key: _truth(path, element, name)
+    values: dict[str, Any] = {
+        key: _flag(path, element, name)
         for key, name in (("use_mask", "use-vertex-mask"), ("invert_mask", "invert-vertex-mask"))
     }
     if element.tag == "ease-deformer":
-        rest |= {"falloff": "ease", "ease": _number(path, element, "ease")}
+        values |= {"falloff": "ease", "ease": _number(path, element, "ease")}
     else:
-        rest |= {
+        values |= {
             "falloff": "smooth",
             "smooth_centre": _number(path, element, "smooth-center") / 100,
             "smooth_side": _number(path, element, "smooth-side") / 100,
         }
     try:
-        return Zone(fap, size=size, scale=(x, y, z), **rest)
+        return Zone(fap, size=size, scale=(x, y, z), **values)
     except FaceError as error:
         raise FaceError(f"{path}: {error}") from None
 
 
-def _attributes(path: Path, element: Element, tag: str, wanted: tuple[str, ...]) -> dict[str, str]:
-    if element.tag != tag or set(element.attrib) != set(wanted):
+def _attributes(path: Path, element: Element, tag: str, names: tuple[str, ...]) -> dict[str, str]:
+    if element.tag != tag or set(element.attrib) != set(names):
         raise FaceError(
-            f"{path}: wanted <{tag}> with {', '.join(wanted)}; got <{element.tag}> with "
+            f"{path}: wanted <{tag}> with {', '.join(names)}; got <{element.tag}> with "
             f"{', '.join(element.attrib) or 'nothing'}"
         )
     return dict(element.attrib)
 
 
-def _place(path: Path, element: Element) -> Triple:
-    x, y, z = (_number(path, element, name) for name in PLACE)
+def _position(path: Path, element: Element) -> Triple:
+    x, y, z = (_number(path, element, name) for name in AXES)
     return x, y, z
 
 
@@ -227,7 +229,7 @@ def _number(path: Path, element: Element, name: str) -> float:
     return float(text)
 
 
-def _truth(path: Path, element: Element, name: str) -> bool:
+def _flag(path: Path, element: Element, name: str) -> bool:
     text = element.get(name, "").strip().lower()
     if text not in ("true", "false", "1", "0"):
         raise FaceError(f"{path}: <{element.tag}> {name}: wanted true or false, got {text!r}")
@@ -250,7 +252,7 @@ def _doctype() -> str:
         "<!ELEMENT vertex-mask (#PCDATA)>",
         *(f"<!ELEMENT {tag} EMPTY>" for tag in ("fp-position", *ATTRIBUTES)),
     ]
-    attributes = {"fp-position": ("fp", *PLACE), **ATTRIBUTES, "vertex-mask": ("fap",)}
+    attributes = {"fp-position": ("fp", *AXES), **ATTRIBUTES, "vertex-mask": ("fap",)}
     lists = [
         f"<!ATTLIST {tag} {name} CDATA #REQUIRED>" for tag, names in attributes.items() for name in names
     ]

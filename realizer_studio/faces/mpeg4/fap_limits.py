@@ -4,21 +4,21 @@ from functools import cache
 
 from realizer.tables import au_to_fap, faps
 
-# Limits of FAPs that no action unit uses: what faces can reach, in the FAP's own unit.
+# Limits of FAPs that no action unit uses, in the FAP's unit: what faces can reach.
 REACH = {"MNS": 250.0, "MW": 150.0, "ENS": 100.0, "ES": 100.0, "IRISD": 300.0, "angle_unit": 20000.0}
 EYEBALLS_OUT = 30.0  # ES: 2 mm
 PUPIL = 150.0  # IRISD: 1.5 mm wider or narrower; half an iris would shut a pupil
 OPEN_JAW = 3
-ROLLED = -0.5  # lips may turn by 120 degrees at most; its cosine
-ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # what the jaw takes along: the lower lip and the corners
+ROLLED = -0.5  # cosine of 120 degrees, by which lips may turn at most
+ON_JAW = {5, 10, 11, 12, 13, 52, 57, 58, 59, 60}  # points that the jaw moves: lower lip, corners
 
 
 @cache
 def usual_range(fap: int, sign: int) -> float:
-    """Return how far a FAP usually goes in one direction (sign 1 or -1), in its own unit, positive.
+    """Return the usual maximum of a FAP in one direction (sign 1 or -1), in its unit, positive.
 
-    It is the most that one action unit asks for, or else what faces reach. FAPs in ON_JAW move with the jaw;
-    only what an action unit adds to its movement of the jaw counts.
+    It is the largest value that an action unit sets, or else what faces reach. For FAPs in ON_JAW it is what
+    an action unit adds to the movement of the jaw.
     """
     row = faps()[fap - 1]
     on_jaw = fap in ON_JAW and sign < 0
@@ -33,7 +33,7 @@ def usual_range(fap: int, sign: int) -> float:
 
 @cache
 def required_range(fap: int, sign: int) -> float:
-    """Return the largest value that a face must support: the usual maximum, at least what faces reach."""
+    """Return the largest value that a face must support: the usual maximum, or what faces reach if larger."""
     row = faps()[fap - 1]
     most = row.most if sign > 0 else -row.least
     return max(usual_range(fap, sign), min(_face_range(fap), float(most)))
@@ -41,7 +41,7 @@ def required_range(fap: int, sign: int) -> float:
 
 @cache
 def accompanying_faps(fap: int, sign: int) -> dict[int, float]:
-    """Return the FAPs of the action unit that uses one FAP most in a direction, or an empty mapping."""
+    """Return the FAPs of the action unit that moves a FAP most in a direction, empty if none does."""
     strongest = max(_faps_of_units().values(), key=lambda unit: sign * unit.get(fap, 0.0))
     return dict(strongest) if sign * strongest.get(fap, 0.0) > 0 else {}
 
@@ -55,7 +55,7 @@ def _face_range(fap: int) -> float:
 
 @cache
 def _faps_of_units() -> dict[str, dict[int, float]]:
-    """Return action unit -> FAP -> value at intensity 1, both sides."""
+    """Return action unit -> FAP -> value at intensity 1, of both sides."""
     out: dict[str, dict[int, float]] = {}
     for row in au_to_fap():
         values = out.setdefault(str(row.au), {})

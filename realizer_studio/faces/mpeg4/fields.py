@@ -1,9 +1,9 @@
 """The displacement field of each FAP, per metre of movement of its feature point.
 
-Neighbours whose zones meet share what they both move. At a vertex every one of them gets a part of the
-influence of the line that joins their points, and the parts add up to one: equal FAPs move the skin between
-them as far as themselves, without the w that a plain sum makes (Paul 2010, 7.1). As a neighbour's part is 0
-at the other's feature point, every point moves exactly as its own FAP says, whatever the others do.
+Neighbouring zones that overlap share their influence. At a vertex each zone gets a share of the influence
+around the line between their feature points, and the shares add up to one: equal FAPs move the skin between
+them evenly, where a plain sum would make a w (Paul 2010, 7.1). A zone's share is 0 at the feature point of a
+neighbour, so each feature point moves exactly as its own FAP requests.
 """
 
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ from realizer.tables import csv_rows, faps
 from realizer_studio.faces.mpeg4.zones import Setup, Zone
 
 # The unit vectors of FAP directions.
-WAYS: dict[str, tuple[float, float, float]] = {
+DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "up": (0, 1, 0), "down": (0, -1, 0), "left": (1, 0, 0), "right": (-1, 0, 0), "forward": (0, 0, 1),
 }  # fmt: skip
-NEAREST = 1e-9  # in radii: at a feature point the share is its own
-POWER = 1.2  # of the distance: 1 bends sharply at a point, 2 makes a step half-way to the next
+NEAREST = 1e-9  # radii; at a feature point the share of its zone is 1
+POWER = 1.2  # of the distance: 1 makes a kink at a feature point, 2 a step half-way to the next
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ pairs = cache(partial(csv_rows, "neighbours.csv", _Pair, __package__))  # FAPs w
 
 
 def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
-    """Return FAP -> field (n, 3), for every FAP that has a zone.
+    """Return FAP -> displacement field (n, 3), for every FAP that has a zone.
 
     Raises:
         FaceError: a zone whose feature point is missing, whose mask is out of range, or that moves nothing
@@ -46,7 +46,7 @@ def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
     n = len(at)
     distance, open_ = {}, {}
     for fap, zone in setup.zones.items():
-        distance[fap] = np.linalg.norm((at - _middle(setup, zone)) / zone.radii, axis=1)
+        distance[fap] = np.linalg.norm((at - _centre(setup, zone)) / zone.radii, axis=1)
         open_[fap] = _unmasked(setup, zone, n)
     weights = {fap: zone.influence(distance[fap]) * open_[fap] for fap, zone in setup.zones.items()}
     if setup.joined and setup.zones:
@@ -54,7 +54,7 @@ def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
     return {fap: _directed(setup, zone, at, weights[fap]) for fap, zone in setup.zones.items()}
 
 
-def _middle(setup: Setup, zone: Zone) -> Float64:
+def _centre(setup: Setup, zone: Zone) -> Float64:
     name = faps()[zone.fap - 1].feature_point
     if name not in setup.points:
         raise FaceError(f"zone of FAP {zone.fap}: its feature point {name} is not there; add it")
@@ -82,39 +82,39 @@ def _shared(
     at: Float64,
     distance: Mapping[int, Float64],
     open_: Mapping[int, Float64],
-    alone: Mapping[int, Float64],
+    unshared: Mapping[int, Float64],
 ) -> dict[int, Float64]:
     """Return the influence of each zone after overlapping neighbours have shared it."""
     links = [pair for pair in pairs() if pair.one in setup.zones and pair.other in setup.zones]
     order = sorted(setup.zones)
     joined = np.array([[order.index(pair.one), order.index(pair.other)] for pair in links], np.int32)
     label = components(joined.reshape(-1, 2), len(order))
-    out = dict(alone)
+    out = dict(unshared)
     for k in np.flatnonzero(np.bincount(label) > 1):
         group = [order[i] for i in np.flatnonzero(label == k)]
-        envelope = np.max([alone[fap] for fap in group], axis=0)
+        envelope = np.max([unshared[fap] for fap in group], axis=0)
         for pair in links:
             if pair.one in group:
                 envelope = np.maximum(
                     envelope, _between(setup, pair, at) * open_[pair.one] * open_[pair.other]
                 )
         # Vertices near a point belong to its zone; zones farther than twice their radius have no influence.
-        say = {
+        strength = {
             fap: open_[fap]
             * np.clip(2 - distance[fap], 0, None) ** 2
             / np.maximum(distance[fap], NEAREST) ** POWER
             for fap in group
         }
-        whole = np.maximum(np.sum(list(say.values()), axis=0), 1e-30)
+        total = np.maximum(np.sum(list(strength.values()), axis=0), 1e-30)
         for fap in group:
-            out[fap] = envelope * say[fap] / whole
+            out[fap] = envelope * strength[fap] / total
     return out
 
 
 def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
     """Return the influence around the line between two neighbours' points, with interpolated radii."""
     one, other = setup.zones[pair.one], setup.zones[pair.other]
-    a, b = _middle(setup, one), _middle(setup, other)
+    a, b = _centre(setup, one), _centre(setup, other)
     along = b - a
     t = np.clip((at - a) @ along / max(float(along @ along), 1e-18), 0, 1)
     radii = one.radii + t[:, None] * (other.radii - one.radii)
@@ -123,21 +123,21 @@ def _between(setup: Setup, pair: _Pair, at: Float64) -> Float64:
 
 
 def _directed(setup: Setup, zone: Zone, at: Float64, weight: Float64) -> Float64:
-    """Return the field: the weight along the FAP's way, bent as the zone says, 1 at the feature point."""
+    """Return the field of a zone: its influence times its direction, scaled to 1 at the feature point."""
     row = faps()[zone.fap - 1]
-    way = np.array(WAYS[row.direction])
-    move = np.broadcast_to(way + zone.slide * np.array([0, 0, 1.0]), at.shape)
-    middle = _middle(setup, zone)
+    direction = np.array(DIRECTIONS[row.direction])
+    move = np.broadcast_to(direction + zone.slide * np.array([0, 0, 1.0]), at.shape)
+    middle = _centre(setup, zone)
     if zone.radial:
-        away = at - np.array(zone.pivot)
-        away /= max(float(np.linalg.norm(middle - zone.pivot)), 1e-9)
-        move = (1 - zone.radial) * move + zone.radial * away
+        outward = at - np.array(zone.pivot)
+        outward /= max(float(np.linalg.norm(middle - zone.pivot)), 1e-9)
+        move = (1 - zone.radial) * move + zone.radial * outward
     field = np.asarray(move * weight[:, None])
     nearest = int(np.argmin(np.linalg.norm(at - middle, axis=1)))
-    here = float(field[nearest] @ way)
-    if here < 1e-3:
+    scale = float(field[nearest] @ direction)
+    if scale < 1e-3:
         raise FaceError(
             f"zone of FAP {zone.fap}: it does not move vertex {nearest} at its feature point "
             f"{row.feature_point}; make it larger, or put the vertex into its mask"
         )
-    return np.asarray(field / here)
+    return np.asarray(field / scale)

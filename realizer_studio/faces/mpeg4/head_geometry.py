@@ -1,4 +1,4 @@
-"""Landmarks that the shape of a head shows by itself, for locating feature points."""
+"""Landmarks computed from the shape of a head, which help to locate feature points."""
 
 from dataclasses import dataclass
 
@@ -6,54 +6,54 @@ import numpy as np
 
 from realizer.core.array_types import Bool, Float64, Int32
 
-GRID = 72  # rows and columns that an eye's opening is looked at with
-SLICES = 320  # heights that the profile is looked at with
-ASIDE = 0.002  # eye distances
+GRID = 72  # rows and columns of the depth image of an eye
+SLICES = 320  # heights of the profile
+BESIDE = 0.002  # eye distances
 
 
 @dataclass(frozen=True, eq=False)
 class HeadGeometry:
-    """A head in its own measure."""
+    """A head, measured in eye distances."""
 
     skin: Float64  # (n, 3) in eye distances from the middle between the eyes
     triangles: Int32  # (m, 3)
-    ups: Float64  # (n, 3) unit normals
+    normals: Float64  # (n, 3) unit normals
     left: Float64  # (3,) centre of the left eyeball
     right: Float64  # (3,) centre of the right one
-    radius: float  # theirs
+    radius: float  # of the eyeballs
 
 
 def find_anchors(head: HeadGeometry) -> dict[str, Float64]:
-    """Return anchor name -> place (3,), for the anchors that were found."""
+    """Return anchor name -> position (3,), for the anchors that are found."""
     found = _profile(head)
     for side, centre in (("l", head.left), ("r", head.right)):
-        found |= {f"{side}_{name}": place for name, place in _opening(head, centre, side).items()}
+        found |= {f"{side}_{name}": position for name, position in _opening(head, centre, side).items()}
     found |= _corners(head, found)
     found |= _outline(head)
     return found
 
 
 def profile_line(head: HeadGeometry) -> tuple[Float64, Float64]:
-    """Return heights, and how far forward the middle of the face reaches at each; NaN without skin."""
+    """Return heights, and the foremost z of the middle of the face at each; NaN where there is no skin."""
     at, tri = head.skin, head.triangles
-    near = at[tri[(np.abs(at[tri, 0]) < 0.6).all(axis=1) & (at[tri, 2] > -0.4).all(axis=1)]]
+    strip = at[tri[(np.abs(at[tri, 0]) < 0.6).all(axis=1) & (at[tri, 2] > -0.4).all(axis=1)]]
     heights = np.linspace(-2.2, 1.0, SLICES)
     front = np.full(SLICES, np.nan)
-    # Beside the very middle, where meshes have their edges.
-    sides = near[:, :, 0] > ASIDE
-    for corners, beyond in zip(near, sides, strict=True):
-        if beyond.all() or not beyond.any():
+    # The profile is measured beside x = 0, where meshes have edges.
+    sides = strip[:, :, 0] > BESIDE
+    for corners, past in zip(strip, sides, strict=True):
+        if past.all() or not past.any():
             continue
-        odd = int(np.flatnonzero(beyond == (beyond.sum() == 1))[0])
-        p = corners[odd]
-        ends = []
-        for q in (corners[odd - 1], corners[odd - 2]):
-            t = (p[0] - ASIDE) / (p[0] - q[0])
-            ends.append(p + t * (q - p))
-        low, high = sorted(ends, key=lambda end: float(end[1]))
-        here = np.flatnonzero((heights >= low[1]) & (heights <= high[1]))
-        z = np.interp(heights[here], [low[1], high[1]], [low[2], high[2]])
-        front[here] = np.fmax(front[here], z)
+        apex = int(np.flatnonzero(past == (past.sum() == 1))[0])
+        p = corners[apex]
+        crossings = []
+        for q in (corners[apex - 1], corners[apex - 2]):
+            t = (p[0] - BESIDE) / (p[0] - q[0])
+            crossings.append(p + t * (q - p))
+        low, high = sorted(crossings, key=lambda end: float(end[1]))
+        rows = np.flatnonzero((heights >= low[1]) & (heights <= high[1]))
+        z = np.interp(heights[rows], [low[1], high[1]], [low[2], high[2]])
+        front[rows] = np.fmax(front[rows], z)
     return heights, front
 
 
@@ -61,7 +61,7 @@ def _profile(head: HeadGeometry) -> dict[str, Float64]:
     heights, front = profile_line(head)
     kernel = np.array([1, 2, 3, 2, 1]) / 9
 
-    def place(k: int) -> Float64:
+    def point(k: int) -> Float64:
         return np.array([0.0, heights[k], front[k]])
 
     out: dict[str, Float64] = {}
@@ -69,11 +69,11 @@ def _profile(head: HeadGeometry) -> dict[str, Float64]:
     if len(nose) < 5:
         return out
     tip = int(nose[np.argmax(front[nose])])
-    out["tip"] = place(tip)
-    # Between the brows and the tip, the bridge is the deepest point.
+    out["tip"] = point(tip)
+    # The bridge is the deepest point between the brows and the tip.
     bridge = np.flatnonzero((heights > heights[tip] + 0.1) & (heights < 0.4) & np.isfinite(front))
     if len(bridge):
-        out["bridge"] = place(int(bridge[np.argmin(front[bridge])]))
+        out["bridge"] = point(int(bridge[np.argmin(front[bridge])]))
     reach = (heights < heights[tip]) & (heights > heights[tip] - 1.6)
     below = np.flatnonzero(reach & np.isfinite(front))[::-1]
     if len(below) < 20:
@@ -83,37 +83,37 @@ def _profile(head: HeadGeometry) -> dict[str, Float64]:
     if len(peaks) < 2:
         return out
     upper, lower = peaks[:2]
-    # A chin that recedes has no peak of its own.
+    # A receding chin makes no peak.
     chin = peaks[2] if len(peaks) > 2 else None
     base = int(np.argmin(z[:upper]))
     slit = upper + int(np.argmin(z[upper:lower]))
-    marks = {"base": base, "upper": upper, "slit": slit, "lower": lower}
+    landmarks = {"base": base, "upper": upper, "slit": slit, "lower": lower}
     if chin is not None:
-        marks |= {"dip": lower + int(np.argmin(z[lower:chin])), "chin": chin}
-    for name, i in marks.items():
-        out[name] = place(int(below[i]))
+        landmarks |= {"dip": lower + int(np.argmin(z[lower:chin])), "chin": chin}
+    for name, i in landmarks.items():
+        out[name] = point(int(below[i]))
     first = heights[below[lower if chin is None else chin]] - (0.25 if chin is None else 0)
     under = [int(k) for k in below if first - 0.35 < heights[k] <= first]
     if under:
-        # The chin's underside begins farthest down and forwards.
-        out["under"] = place(max(under, key=lambda k: 0.5 * front[k] - 0.5 * heights[k]))
+        # The underside of the chin begins at the point farthest down and forwards.
+        out["under"] = point(max(under, key=lambda k: 0.5 * front[k] - 0.5 * heights[k]))
     return out
 
 
 def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float64]:
-    """Return the corners and edges of the gap between the lids, seen from the front."""
+    """Return the corners and edges of the opening between the lids, from a depth image of the front."""
     size = 1.25 * head.radius
     x = centre[0] + np.linspace(-size, size, GRID)
     y = centre[1] + np.linspace(-size, size, GRID)
     depth = np.full((GRID, GRID), -np.inf)
     at, tri = head.skin, head.triangles
-    mine = tri[
+    nearby = tri[
         (np.abs(at[tri, 0] - centre[0]).min(axis=1) < size)
         & (np.abs(at[tri, 1] - centre[1]).min(axis=1) < size)
         & (at[tri, 2] > centre[2] - 0.1).all(axis=1)
     ]
     px, py = np.meshgrid(x, y)
-    for a, b, c in at[mine]:
+    for a, b, c in at[nearby]:
         lo = np.searchsorted(x, min(a[0], b[0], c[0])), np.searchsorted(y, min(a[1], b[1], c[1]))
         hi = np.searchsorted(x, max(a[0], b[0], c[0])), np.searchsorted(y, max(a[1], b[1], c[1]))
         area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])
@@ -131,15 +131,15 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
     from scipy.ndimage import label
 
     regions, _ = label(~covered)
-    # An eye that is almost shut shows below or above the ball's middle.
+    # The opening of an almost shut eye is below or above the centre of the ball.
     open_ = np.argwhere(regions > 0)
     if not len(open_):
         return {}
-    off = np.linalg.norm((open_ - (GRID - 1) / 2) * [1, 2], axis=1)
-    if off.min() > 0.3 * GRID:
+    distance = np.linalg.norm((open_ - (GRID - 1) / 2) * [1, 2], axis=1)
+    if distance.min() > 0.3 * GRID:
         return {}
-    seen = regions[tuple(open_[np.argmin(off)])]
-    rows, columns = np.nonzero(regions == seen)
+    eye = regions[tuple(open_[np.argmin(distance)])]
+    rows, columns = np.nonzero(regions == eye)
     inner_first = side == "l"
 
     def mean(chosen: Bool) -> Float64:
@@ -160,7 +160,7 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
 
 
 def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64]:
-    """Return the mouth's corners: the ends of where skin touches skin."""
+    """Return the corners of the mouth, which are the ends of the line where the lips touch."""
     from scipy.spatial import cKDTree
 
     if "slit" not in found:
@@ -171,23 +171,23 @@ def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64
         & (np.abs(head.skin[:, 1] - slit[1]) < 0.14)
         & (head.skin[:, 2] > slit[2] - 0.45)
     )
-    at, ups = head.skin[box], head.ups[box]
+    at, normals = head.skin[box], head.normals[box]
     if len(box) < 8:
         return {}
     pairs = cKDTree(at).query_pairs(0.045, output_type="ndarray")
     if not len(pairs):
         return {}
     i, j = pairs.T
-    facing = (ups[i] * ups[j]).sum(axis=1) < -0.25
+    facing = (normals[i] * normals[j]).sum(axis=1) < -0.25
     touching = np.unique(pairs[facing])
     outer = touching[np.abs(at[touching, 0]) > 0.12] if len(touching) else touching
     out = {}
     for name, sign in (("l_corner", 1), ("r_corner", -1)):
-        mine = outer[at[outer, 0] * sign > 0] if len(outer) else outer
-        # Of touching points, the edge of the mouth is in front.
-        mine = mine[at[mine, 2] > slit[2] - 0.30] if len(mine) else mine
-        if len(mine):
-            ends = mine[np.argsort(-at[mine, 0] * sign)[:3]]
+        corner = outer[at[outer, 0] * sign > 0] if len(outer) else outer
+        # Points that touch farther back are inside the mouth.
+        corner = corner[at[corner, 2] > slit[2] - 0.30] if len(corner) else corner
+        if len(corner):
+            ends = corner[np.argsort(-at[corner, 0] * sign)[:3]]
             out[name] = at[ends].mean(axis=0)
     if len(out) == 2 and abs(abs(out["l_corner"][0]) - abs(out["r_corner"][0])) > 0.1:
         return {}
@@ -199,7 +199,7 @@ def _outline(head: HeadGeometry) -> dict[str, Float64]:
     at, out = head.skin, {}
     above = at[at[:, 1] > -1.3]
     top, back = above[np.argmax(above[:, 1])], above[np.argmin(above[:, 2])]
-    # Round as a skull is, it shows how high and how far back, but not where: NaN is not known.
+    # A skull is round: its height and depth are known, but not the exact position. NaN means unknown.
     out["top"] = np.array([0, top[1], np.nan])
     out["back"] = np.array([0, np.nan, back[2]])
     for name, sign in (("l_ear", 1), ("r_ear", -1)):

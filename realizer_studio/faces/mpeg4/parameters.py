@@ -29,35 +29,35 @@ def read_setup(path: Path) -> Setup:
         FaceError: no such file, not TOML, an unknown key, or a value of the wrong kind or out of range.
     """
     with face_errors(path, "a TOML file with the deformer's zones"):
-        read = parse_toml(path.read_text("utf-8"))
-    return setup_from(path, read)
+        table = parse_toml(path.read_text("utf-8"))
+    return setup_from(path, table)
 
 
-def setup_from(path: Path | str, read: dict[str, Any]) -> Setup:
-    """Return the parameters in a table with the keys of the file, as `setup_table` makes it.
+def setup_from(path: Path | str, table: dict[str, Any]) -> Setup:
+    """Return the parameters from a table with the keys of the file, as `setup_table` returns it.
 
     Raises:
         FaceError: as `read_setup`; `path` begins its text.
     """
-    if unknown := sorted(set(read) - set(KEYS)):
+    if unknown := sorted(set(table) - set(KEYS)):
         raise FaceError(f"{path}: wanted {', '.join(KEYS)}; got {', '.join(unknown)}")
     zones: dict[int, Zone] = {}
-    for number, entry in enumerate(_entry(path, read, "zone", list), 1):
+    for number, entry in enumerate(_entry(path, table, "zone", list), 1):
         zone = _zone(f"{path}: zone {number}", entry)
         if zone.fap in zones:
             raise FaceError(f"{path}: zone {number}: FAP {zone.fap} has one already; delete one of them")
         zones[zone.fap] = zone
     masks: dict[int, Int32] = {}
-    for key, ranges in _entry(path, read, "masks", dict).items():
+    for key, ranges in _entry(path, table, "masks", dict).items():
         for word in key.split():
-            masks[_whole(f"{path}: masks: {key!r}", word)] = _expanded(f"{path}: masks: {key!r}", ranges)
-    places = _entry(path, read, "points", dict)
-    points = {name: _triple(f"{path}: points: {name}", place) for name, place in places.items()}
-    synced, whole = (
-        frozenset(_whole(f"{path}: {key}", fap) for fap in _entry(path, read, key, list))
+            masks[_integer(f"{path}: masks: {key!r}", word)] = _expanded(f"{path}: masks: {key!r}", ranges)
+    positions = _entry(path, table, "points", dict)
+    points = {name: _triple(f"{path}: points: {name}", position) for name, position in positions.items()}
+    synced, rigid = (
+        frozenset(_integer(f"{path}: {key}", fap) for fap in _entry(path, table, key, list))
         for key in ("synced", "whole")
     )
-    return Setup(points, zones, masks, synced, bool(read.get("joined", True)), whole)
+    return Setup(points, zones, masks, synced, bool(table.get("joined", True)), rigid)
 
 
 def setup_table(setup: Setup) -> dict[str, Any]:
@@ -65,26 +65,26 @@ def setup_table(setup: Setup) -> dict[str, Any]:
     return {
         "joined": setup.joined,
         "synced": sorted(setup.synced),
-        "whole": sorted(setup.whole),
-        "points": {name: list(place) for name, place in setup.points.items()},
+        "whole": sorted(setup.rigid),
+        "points": {name: list(position) for name, position in setup.points.items()},
         "zone": [asdict(setup.zones[fap]) for fap in sorted(setup.zones)],
         "masks": {str(fap): ranges(mask) for fap, mask in sorted(setup.masks.items())},
     }
 
 
 def write_setup(path: Path, setup: Setup) -> None:
-    """Write the file without feature points: those of the folder's features.csv count."""
+    """Write the file, without feature points, which are in the folder's features.csv."""
     lines = [HEAD + f"joined = {_toml(setup.joined)}"]
     lines.append(
         f"synced = [{', '.join(map(str, sorted(setup.synced)))}]  # FAPs whose two sides go together"
     )
-    if setup.whole:
-        lines.append(f"whole = [{', '.join(map(str, sorted(setup.whole)))}]")
-    plain = {f.name: f.default for f in fields(Zone)}
+    if setup.rigid:
+        lines.append(f"whole = [{', '.join(map(str, sorted(setup.rigid)))}]")
+    defaults = {f.name: f.default for f in fields(Zone)}
     for fap in sorted(setup.zones):
         zone = setup.zones[fap]
         lines += ["", "[[zone]]"]
-        changed = {name: value for name, value in asdict(zone).items() if value != plain[name]}
+        changed = {name: value for name, value in asdict(zone).items() if value != defaults[name]}
         lines += [f"{name} = {_toml(value)}" for name, value in changed.items()]
     if setup.masks:
         lines += ["", "[masks]  # FAPs that share it = vertices"]
@@ -105,7 +105,7 @@ def _zone(where: str, entry: Any) -> Zone:
     for name in ("fap", "falloff", "size"):
         if name not in entry:
             raise FaceError(f"{where}: {name} is missing")
-    readers: dict[str, Any] = {"Triple": _triple, "int": _whole, "float": _number, "bool": _truth}
+    readers: dict[str, Any] = {"Triple": _triple, "int": _integer, "float": _number, "bool": _flag}
     values = {
         name: readers[kinds[name]](f"{where}: {name}", value) if kinds[name] in readers else value
         for name, value in entry.items()
@@ -117,15 +117,15 @@ def _zone(where: str, entry: Any) -> Zone:
 
 
 def _entry(
-    path: Path | str, read: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]
+    path: Path | str, table: dict[str, Any], key: str, kind: type[list[Any]] | type[dict[str, Any]]
 ) -> Any:
-    value = read.get(key, kind())
+    value = table.get(key, kind())
     if not isinstance(value, kind):
         raise FaceError(f"{path}: {key}: wanted a {'list' if kind is list else 'table'}, got {value!r}")
     return value
 
 
-def _truth(where: str, value: Any) -> bool:
+def _flag(where: str, value: Any) -> bool:
     if not isinstance(value, bool):
         raise FaceError(f"{where}: wanted true or false, got {value!r}")
     return value
@@ -137,7 +137,7 @@ def _number(where: str, value: Any) -> float:
     return float(value)
 
 
-def _whole(where: str, value: Any) -> int:
+def _integer(where: str, value: Any) -> int:
     try:
         return int(value)
     except (TypeError, ValueError, OverflowError):

@@ -17,12 +17,12 @@ LIP_POINTS = (
     "2.4", "2.8", "2.3", "2.9", "2.5", "2.7", "2.2", "2.6", "2.4",
     "8.3", "8.7", "8.2", "8.8", "8.4", "8.6", "8.1", "8.5", "8.3",
 )  # fmt: skip
-# The joint lies above and in front of the ear lobe: shares of the distance between the eyes.
+# The joint of the jaw, above and in front of the ear lobe, in eye distances.
 JOINT = (0.0, -0.51, -0.87)
-# The head's turn fades out below the jaw, along a plane that tilts with it: shares of the eyes' distance.
+# The head's rotation fades out below the jaw, along a tilted plane; eye distances.
 NECK_TILT, NECK_TOP, NECK_END = 0.30, -0.27, -1.55
 PUPIL = 0.0020  # m, if no dark vertices show the pupil's edge
-OVER_BALL = 0.0022  # m; lids lie at most that far from the ball
+OVER_BALL = 0.0022  # m; the largest distance between lid and ball
 TONGUE_MOVES = ("lower_teeth", "tongue")
 
 
@@ -38,56 +38,58 @@ def jaw_pivot(points: Mapping[str, Triple]) -> Float64:
 def jaw_rows(
     at: Float64, points: Mapping[str, Triple], parts: Parts, lower: Int32, pivot: Float64
 ) -> dict[int, Float64]:
-    """Return the rows of the jaw's opening, thrust and shift; FAP 3 does not move the lips.
+    """Return the fields of the jaw's opening, thrust and shift; FAP 3 does not move the lips.
 
     Args:
         lower: vertices of the skin below the mouth's slit.
     """
-    place = {name: np.array(value) for name, value in points.items()}
-    chin, corner = place["2.1"], place["2.13"]
-    mouth = (place["2.4"] + place["2.5"]) / 2
+    positions = {name: np.array(value) for name, value in points.items()}
+    chin, corner = positions["2.1"], positions["2.13"]
+    mouth = (positions["2.4"] + positions["2.5"]) / 2
     below = np.zeros(len(at))
     below[lower] = 1
-    # At the corners above and below are one.
-    corners = [place[name] for name in ("2.4", "2.5", "8.3", "8.4")]
+    # At the corners of the mouth, upper and lower side blend.
+    corners = [positions[name] for name in ("2.4", "2.5", "8.3", "8.4")]
     meet = smooth(np.min([np.linalg.norm(at - c, axis=1) for c in corners], axis=0), 0.010, 0.002)
     below = below * (1 - meet) + 0.5 * meet
-    # Flat and wide: over the whole jaw, not above the mouth.
+    # The zone covers the jaw, and ends at the mouth.
     wide, deep = 1.25 * abs(corner[0] - chin[0]), 1.25 * abs(corner[2] - chin[2])
     tall = abs(mouth[1] - chin[1]) * 1.45
     distance = np.linalg.norm((at - chin) / [wide, tall, deep], axis=1)
     drag = below * smooth(distance, 1.0, 0.30)
-    # Beside the mouth the cheek is stretched: no edge where the slit's sides meet.
-    aside = smooth(np.abs(at[:, 0] - mouth[0]), abs(place["8.3"][0]) * 1.0, abs(place["8.3"][0]) * 1.5)
+    # The cheek is stretched beside the mouth, so that no edge shows where the sides of the slit meet.
+    beside_mouth = smooth(
+        np.abs(at[:, 0] - mouth[0]), abs(positions["8.3"][0]) * 1.0, abs(positions["8.3"][0]) * 1.5
+    )
     cheek = smooth(distance, 1.0, 0.30) * smooth(at[:, 1], mouth[1] + 0.006, mouth[1] - 0.022)
-    drag = drag * (1 - aside) + aside * cheek
-    lips, nearest = _to_lips(at, place)
-    hold = smooth(lips, 0.95 * float(np.linalg.norm(place["8.2"] - place["2.1"])), 0.0025)
+    drag = drag * (1 - beside_mouth) + beside_mouth * cheek
+    lips, nearest = _to_lips(at, positions)
+    lip_share = smooth(lips, 0.95 * float(np.linalg.norm(positions["8.2"] - positions["2.1"])), 0.0025)
     mover = np.zeros(len(at))
     for name in TONGUE_MOVES:
         if name in parts:
             mover[slice(*parts[name])] = 1
     inner = skin_only(len(at), parts)
-    opens = drag * (1 - hold) * inner + mover
+    opening = drag * (1 - lip_share) * inner + mover
     vertex = int(np.argmin(np.linalg.norm(at - chin, axis=1)))
-    opens = np.minimum(opens / max(opens[vertex], 1e-6), 1)
-    # Thrust and shift take the lower lip along, its corners by half.
-    near = smooth(lips, 0.012, 0.002) * nearest
-    slides = drag * inner * (1 - 0.5 * near) + mover
-    slides /= max(slides[vertex], 1e-6)
-    return opening_rows(at, pivot, opens) | {
-        14: slides[:, None] * np.array([0, 0, 1.0]),
-        15: slides[:, None] * np.array([-1.0, 0, 0]),
+    opening = np.minimum(opening / max(opening[vertex], 1e-6), 1)
+    # Thrust and shift move the lower lip, and half as much the corners.
+    lip_corner = smooth(lips, 0.012, 0.002) * nearest
+    sliding_share = drag * inner * (1 - 0.5 * lip_corner) + mover
+    sliding_share /= max(sliding_share[vertex], 1e-6)
+    return opening_rows(at, pivot, opening) | {
+        14: sliding_share[:, None] * np.array([0, 0, 1.0]),
+        15: sliding_share[:, None] * np.array([-1.0, 0, 0]),
     }
 
 
 def opening_rows(at: Float64, pivot: Float64, share: Any) -> dict[int, Float64]:
-    """Return the three rows of an opening jaw, (n, 3) each, for vertices (n, 3) that follow it by a share."""
-    # Turned by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
+    """Return the three fields of an opening jaw, (n, 3) each; `share`: (n,) how far vertices follow it."""
+    # A rotation by a about +x: y' = y cos a - z sin a, z' = y sin a + z cos a.
     y, z = (at - pivot)[:, 1:].T
     none = np.zeros_like(y)
-    ways = {JAW_COS: (none, -y, -z), JAW_SIN: (none, -z, y), JAW_DROP: (none, none - 1, none)}
-    return {row + 1: (share * np.array(way)).T for row, way in ways.items()}
+    rows = {JAW_COS: (none, -y, -z), JAW_SIN: (none, -z, y), JAW_DROP: (none, none - 1, none)}
+    return {number + 1: (share * np.array(row)).T for number, row in rows.items()}
 
 
 def skin_only(n: int, parts: Parts) -> Float64:
@@ -97,52 +99,52 @@ def skin_only(n: int, parts: Parts) -> Float64:
     return out
 
 
-def _to_lips(at: Float64, place: Mapping[str, Float64]) -> tuple[Float64, Float64]:
-    """Return the distance to the contours of the lips in metres, and how near a corner is to it, 0..1."""
+def _to_lips(at: Float64, positions: Mapping[str, Float64]) -> tuple[Float64, Float64]:
+    """Return the distance to the lip contours in metres, and the share of the corners, 0..1."""
     best, corner = np.full(len(at), np.inf), np.zeros(len(at))
     for first, last in pairwise(LIP_POINTS):
         if first == "2.4" and last == "8.3":
             continue
-        a, b = place[first], place[last]
+        a, b = positions[first], positions[last]
         along = b - a
         t = np.clip((at - a) @ along / max(float(along @ along), 1e-18), 0, 1)
-        away = np.linalg.norm(at - a - t[:, None] * along, axis=1)
+        distance = np.linalg.norm(at - a - t[:, None] * along, axis=1)
         ends = [name in ("2.4", "2.5", "8.3", "8.4") for name in (first, last)]
         share = (1 - t) * ends[0] + t * ends[1]
-        closer = away < best
-        best, corner = np.where(closer, away, best), np.where(closer, share, corner)
+        closer = distance < best
+        best, corner = np.where(closer, distance, best), np.where(closer, share, corner)
     return best, corner
 
 
 def tongue_rows(at: Float64, points: Mapping[str, Triple], parts: Parts) -> dict[int, Float64]:
-    """Return the rows of FAPs 43 to 46 and of the tongue's roll; empty without a tongue."""
+    """Return the fields of FAPs 43 to 46 and of the tongue's roll; empty if there is no tongue."""
     if "tongue" not in parts:
         return {}
-    mine = slice(*parts["tongue"])
-    back, front = at[mine, 2].min(), at[mine, 2].max()
+    tongue = slice(*parts["tongue"])
+    back, front = at[tongue, 2].min(), at[tongue, 2].max()
     along = np.zeros(len(at))
-    along[mine] = np.clip((at[mine, 2] - back) / max(front - back, 1e-9), 0, 1)
+    along[tongue] = np.clip((at[tongue, 2] - back) / max(front - back, 1e-9), 0, 1)
     inside = np.zeros(len(at))
-    inside[mine] = 1
+    inside[tongue] = 1
     bend, arch, out = tongue_bends(at, along, inside)
-    for fap, name, weight, way in (
+    for fap, name, weight, direction in (
         (43, "6.1", bend, (-1.0, 0, 0)), (44, "6.1", bend, (0, 1.0, 0)),
         (45, "6.1", along**1.5, (0, 0, 1.0)), (46, "6.2", arch, (0, 1.0, 0)),
     ):  # fmt: skip
-        tip = mine.start + int(np.argmin(np.linalg.norm(at[mine] - np.array(points[name]), axis=1)))
-        out[fap] = (weight / max(float(weight[tip]), 1e-6))[:, None] * np.array(way)
+        tip = tongue.start + int(np.argmin(np.linalg.norm(at[tongue] - np.array(points[name]), axis=1)))
+        out[fap] = (weight / max(float(weight[tip]), 1e-6))[:, None] * np.array(direction)
     return out
 
 
 def tongue_bends(at: Float64, along: Float64, inside: Any) -> tuple[Float64, Float64, dict[int, Float64]]:
-    """Return how far a tongue's vertices bend and arch, (n,) each, and the rows of its roll.
+    """Return the weights by which a tongue's vertices bend and arch, (n,) each, and the fields of its roll.
 
     Args:
         at: (n, 3) metres; along: (n,) 0 at the back of the tongue, 1 at its tip; inside: (n,) 1 on it.
     """
     bend = smooth(along, 0.35, 1.0) * along
     arch = np.sin(np.pi * np.clip((along - 0.15) / 0.85, 0, 1)) ** 2 * inside
-    # Rolled about its middle line: the borders rise, whichever side they are on.
+    # The tongue rolls about its middle line: both borders rise.
     edge = smooth(along, 0.30, 0.65) * inside
     turn_cos, turn_sin = np.zeros_like(at), np.zeros_like(at)
     turn_cos[:, 0], turn_sin[:, 1] = -at[:, 0] * edge, np.abs(at[:, 0]) * edge
@@ -150,34 +152,38 @@ def tongue_bends(at: Float64, along: Float64, inside: Any) -> tuple[Float64, Flo
 
 
 def balls(at: Float64, parts: Parts) -> list[tuple[Float64, float]]:
-    """Return centre and radius of the balls that fit the eyeballs best, left and right."""
+    """Return centre and radius of the best-fitting balls of the left and right eye."""
     return [fit_ball(at[slice(*parts[name])]) for name in ("left_eye", "right_eye")]
 
 
 def pupil_rows(
     at: Float64, colours: Any, parts: Parts, eyes: list[tuple[Float64, float]]
 ) -> dict[int, Float64]:
-    """Return the rows of FAPs 29 and 30: the pupil grows by a metre in diameter per metre of FAP."""
+    """Return the fields of FAPs 29 and 30, which widen a pupil by a metre per metre of FAP."""
     out = {}
     for fap, name, (centre, _) in zip((29, 30), ("left_eye", "right_eye"), eyes, strict=True):
-        mine = slice(*parts[name])
-        away = at[mine] - centre
-        flat = np.hypot(away[:, 0], away[:, 1])
-        dark = (np.asarray(colours)[mine].max(axis=1) < 40) & (away[:, 2] > 0) & (flat < 0.004)
-        edge = float(flat[dark].max()) if dark.any() and flat[dark].max() > 5e-4 else PUPIL
-        # In the black it grows evenly, and the iris makes room up to its own border.
-        share = np.where(flat <= edge, flat / edge, smooth(flat, 2.9 * edge, edge)) / 2
-        ring = away[:, :2] / np.maximum(flat, 1e-9)[:, None] * np.where(away[:, 2] > 0, share, 0)[:, None]
+        eye = slice(*parts[name])
+        offset = at[eye] - centre
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        dark = (np.asarray(colours)[eye].max(axis=1) < 40) & (offset[:, 2] > 0) & (distance < 0.004)
+        edge = float(distance[dark].max()) if dark.any() and distance[dark].max() > 5e-4 else PUPIL
+        # The black of the pupil grows evenly; the iris is compressed up to its border.
+        share = np.where(distance <= edge, distance / edge, smooth(distance, 2.9 * edge, edge)) / 2
+        ring = (
+            offset[:, :2]
+            / np.maximum(distance, 1e-9)[:, None]
+            * np.where(offset[:, 2] > 0, share, 0)[:, None]
+        )
         row = np.zeros_like(at)
-        row[mine, :2] = ring
+        row[eye, :2] = ring
         out[fap] = row
     return out
 
 
 def head_weight(at: Float64, points: Mapping[str, Triple], parts: Parts) -> Float64:
-    """Return how far each vertex turns with the head, (n,): 1 above the jaw, 0 below the neck.
+    """Return the share of the head's rotation for each vertex, (n,): 1 above the jaw, 0 below the neck.
 
-    All parts but skin and clothes turn whole.
+    All parts but skin and clothes rotate fully.
     """
     left, right, chin = (np.array(points[name]) for name in ("3.5", "3.6", "2.1"))
     eyes = float(left[0] - right[0])
@@ -193,19 +199,22 @@ def head_weight(at: Float64, points: Mapping[str, Triple], parts: Parts) -> Floa
 def sliding(
     rows: Mapping[int, Float64], at: Float64, parts: Parts, eyes: list[tuple[Float64, float]]
 ) -> tuple[Any, Any, Any]:
-    """Return vertices of skin, lashes and tears that slide over a ball, which one, and how far from it."""
+    """Return the vertices of skin, lashes and tears that slide over an eyeball, its index, and the radius."""
     index, side, radius = [], [], []
-    ours = skin_only(len(at), parts) > 0
+    candidates = skin_only(len(at), parts) > 0
     for name in ("lashes", "tears"):
         if name in parts:
-            ours[slice(*parts[name])] = True
+            candidates[slice(*parts[name])] = True
     for k, (centre, size) in enumerate(eyes):
         moves = sum(np.abs(rows[fap][:, 1]) for fap in (19 + k, 21 + k) if fap in rows)
-        away = np.linalg.norm(at - centre, axis=1)
-        found = np.flatnonzero(
-            ours & (np.asarray(moves) > 0.02) & (away > size + 0.0001) & (at[:, 2] > centre[2] + 0.002)
+        distance = np.linalg.norm(at - centre, axis=1)
+        selected = np.flatnonzero(
+            candidates
+            & (np.asarray(moves) > 0.02)
+            & (distance > size + 0.0001)
+            & (at[:, 2] > centre[2] + 0.002)
         )
-        index.append(found)
-        side.append(np.full(len(found), k))
-        radius.append(np.minimum(away[found], size + OVER_BALL))
+        index.append(selected)
+        side.append(np.full(len(selected), k))
+        radius.append(np.minimum(distance[selected], size + OVER_BALL))
     return np.concatenate(index), np.concatenate(side), np.concatenate(radius)

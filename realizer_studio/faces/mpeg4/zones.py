@@ -33,7 +33,7 @@ class Zone:
     smooth_centre: float = 0.0  # 0..1, for "smooth"
     smooth_side: float = 0.0  # 0..1, for "smooth"
     use_mask: bool = False  # only vertices of the FAP's mask move
-    invert_mask: bool = False  # only those outside it
+    invert_mask: bool = False  # only vertices outside the mask move
     # Metres forwards per metre along the FAP's direction, for skin that slides over a curve.
     slide: float = 0.0
     # 0..1, part of the displacement that points away from `pivot`, not in the FAP's direction.
@@ -69,13 +69,13 @@ class Zone:
         """Return the influence (n,) at distances (n,) in radii: 1 at the centre, 0 at the edge."""
         if self.falloff == "smooth":
             return smooth_curve(distance, self.smooth_centre, self.smooth_side)
-        away = np.clip(distance, 0, 1)
+        distance_ = np.clip(distance, 0, 1)
         if self.falloff == "cosine":  # raised cosine (Paul 2010, 8.2)
-            return np.asarray((1 + np.cos(np.pi * away)) / 2, np.float64)
+            return np.asarray((1 + np.cos(np.pi * distance_)) / 2, np.float64)
         if self.falloff == "ease":  # Paul 2010, 4.3.3
             power = 1 + self.ease / (100 if self.ease <= 0 else 20)
-            away = away ** max(power, MIN_POWER)
-        return np.asarray(1 - away, np.float64)
+            distance_ = distance_ ** max(power, MIN_POWER)
+        return np.asarray(1 - distance_, np.float64)
 
     def mirrored(self, fap: int) -> Zone:
         """Return the mirrored zone, for the FAP of the other side."""
@@ -93,7 +93,7 @@ class Setup:
     synced: frozenset[int] = frozenset()  # FAPs whose zone is mirrored to the other side
     # Whether overlapping neighbours share their influence, so that equal FAPs move a lip evenly.
     joined: bool = True
-    whole: frozenset[int] = frozenset()  # FAPs without a zone that move a part of the head as a whole
+    rigid: frozenset[int] = frozenset()  # FAPs without a zone that move a part of the head as a whole
 
 
 def smooth_curve(distance: Any, centre: float, side: float) -> Float64:
@@ -146,7 +146,7 @@ def synchronised(setup: Setup, vertices: Float64 | None = None) -> Setup:
 
 
 def mirrorable(setup: Setup, vertices: Float64) -> Setup:
-    """Return the setup in which no FAPs are synchronised whose masks have no mirror image.
+    """Return the setup with synchronisation removed from FAPs whose masks have no mirror image.
 
     Args:
         vertices: (n, 3) metres, of the skin.

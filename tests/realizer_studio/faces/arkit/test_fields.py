@@ -15,7 +15,7 @@ from realizer.tables import faps
 from realizer_studio.faces.arkit.fields import ShapedSkin, shape_fields
 from realizer_studio.faces.arkit.mouth import mouth_of
 from realizer_studio.faces.mpeg4.defaults import split_sides
-from realizer_studio.faces.mpeg4.fields import WAYS
+from realizer_studio.faces.mpeg4.fields import DIRECTIONS
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -73,7 +73,7 @@ def test_shape_fields_move_each_feature_point_by_one(known: dict[str, Any]) -> N
     for fap, field in made.items():
         row = faps()[fap - 1]
         move = field[known["vertex"][row.feature_point]]
-        assert move @ np.array(WAYS[row.direction]) == pytest.approx(1), row.name
+        assert move @ np.array(DIRECTIONS[row.direction]) == pytest.approx(1), row.name
 
 
 def test_shape_fields_divide_the_lips_among_their_points(known: dict[str, Any]) -> None:
@@ -83,7 +83,7 @@ def test_shape_fields_divide_the_lips_among_their_points(known: dict[str, Any]) 
     made = shape_fields(shaped(known, mouthUpperUpLeft=half, mouthUpperUpRight=half, jawOpen=lower))
     for fap in (*upper, *lower):
         row = faps()[fap - 1]
-        along = made[fap] @ np.array(WAYS[row.direction])
+        along = made[fap] @ np.array(DIRECTIONS[row.direction])
         assert along[known["vertex"][row.feature_point]] == pytest.approx(1), row.name
         assert along.max() < 1.5, row.name
 

@@ -14,7 +14,14 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer_studio.faces.check import check_face
-from realizer_studio.faces.mpeg4.build import FILES, apply_zones, copy_with_zones, grown, setup_of, with_brows
+from realizer_studio.faces.mpeg4.build import (
+    FILES,
+    apply_zones,
+    bind_to_skin,
+    copy_with_zones,
+    extend_field,
+    setup_of,
+)
 from realizer_studio.faces.mpeg4.faceeditor import write_faceeditor
 from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
 from realizer_studio.faces.mpeg4.parameters import FILE, write_setup
@@ -54,7 +61,7 @@ def test_apply_zones_makes_true_faps(plain: Path) -> None:
     # Lips that are pushed back stop at the teeth.
     truths = tuple(t for t in truths if (t.fap, t.sign) not in ((16, -1), (17, -1)))
     assert min(t.score for t in truths) >= 2
-    assert all(t.error < 0.02 and t.mirror < 0.01 and t.others < 0.05 for t in truths)
+    assert all(t.error < 0.02 and t.mirror < 0.01 and t.side_effect < 0.05 for t in truths)
 
 
 def test_apply_zones_moves_a_lip_evenly_by_equal_faps(plain: Path) -> None:
@@ -137,7 +144,7 @@ def test_with_brows_moves_what_grows_on_the_skin() -> None:
     at = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.001], [0.1, 0, 0.001], [0, 0.2, 0]])
     parts = {"skin": (0, 3), "beard": (3, 4), "lashes": (4, 5), "hair": (5, 6)}
     field = np.array([[0, 1.0, 0], [0, 2.0, 0], [0, 0, 0]])
-    row = with_brows(at, parts, field, np.full((6, 3), 9.0))
+    row = extend_field(at, parts, field, np.full((6, 3), 9.0))
     assert row[:3] == pytest.approx(field)
     assert row[3] == pytest.approx([0, 1, 0], abs=0.05)
     assert row[4] == pytest.approx([0, 2, 0], abs=0.05)
@@ -156,8 +163,8 @@ def test_copy_with_zones_locates_missing_feature_points(tmp_path: Path) -> None:
 
 def test_grown_vertices_follow_the_nearest_skin() -> None:
     at = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.5]], float)
-    vertex, near, share = grown(at, {"skin": (0, 3), "brows": (3, 4)})
+    vertex, near, share = bind_to_skin(at, {"skin": (0, 3), "brows": (3, 4)})
     assert vertex.tolist() == [3]
     assert near[0, 0] == 0
     assert share.sum() == 1
-    assert len(grown(at, {"skin": (0, 4)})[0]) == 0
+    assert len(bind_to_skin(at, {"skin": (0, 4)})[0]) == 0

@@ -60,7 +60,7 @@ def test_read_faceeditor_returns_the_parameters(tmp_path: Path) -> None:
     assert (brow.falloff, brow.smooth_centre, brow.smooth_side) == ("smooth", 0.25, 0.5)
     assert setup.masks[22].tolist() == [4, 5, 17]
     assert setup.synced == {21, 22, 31, 32}
-    assert setup.whole == {3}
+    assert setup.rigid == {3}
     assert setup.points["2.1"] == (0.0, -10.0, 1.2)
 
 

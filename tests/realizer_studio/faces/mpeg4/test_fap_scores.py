@@ -14,7 +14,7 @@ from tests.shipped import DEFAULT, FACES
 
 pytestmark = pytest.mark.xdist_group("scores")
 
-FINE = {"error": 0.0, "mirror": 0.0, "others": 0.0, "flips": 0.0, "rough": 0.1}
+FINE = {"error": 0.0, "mirror": 0.0, "side_effect": 0.0, "flips": 0.0, "roughness": 0.1}
 
 
 @cache
@@ -52,7 +52,7 @@ def test_mean_score_of_each_face_is_above_paul_s(truths: tuple[FapScore, ...]) -
 def test_score_faps_finds_no_error_on_shipped_faces(truths: tuple[FapScore, ...]) -> None:
     # Lips that are pushed back stop at the teeth.
     assert {(t.fap, t.sign) for t in truths if t.error >= 0.02} <= {(16, -1), (17, -1)}
-    assert all(t.mirror < 0.012 and t.others < 0.05 for t in truths)
+    assert all(t.mirror < 0.012 and t.side_effect < 0.05 for t in truths)
 
 
 def test_mean_score_gives_back_paul_s_own_figures() -> None:
@@ -109,13 +109,13 @@ def test_score_faps_finds_wrong_lengths_and_directions(found: dict[tuple[int, in
 
 @pytest.mark.slow
 def test_score_faps_finds_a_lip_that_drags_the_other(found: dict[tuple[int, int], FapScore]) -> None:
-    assert found[5, 1].others == pytest.approx(0.4, abs=0.02)
+    assert found[5, 1].side_effect == pytest.approx(0.4, abs=0.02)
     assert found[5, 1].score < 2
 
 
 @pytest.mark.slow
 def test_score_faps_calls_a_spike_rough(found: dict[tuple[int, int], FapScore]) -> None:
-    assert found[65, 1].rough > 0.9
+    assert found[65, 1].roughness > 0.9
 
 
 @pytest.mark.slow

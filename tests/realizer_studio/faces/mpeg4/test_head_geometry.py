@@ -32,7 +32,7 @@ def test_profile_line_follows_the_skin() -> None:
 def test_profile_line_has_no_value_where_there_is_no_skin() -> None:
     head = wall(np.full(65, 0.5))
     half = head.triangles[(head.skin[head.triangles][:, :, 1] > -0.6).all(axis=1)]
-    at, line = profile_line(HeadGeometry(head.skin, half, head.ups, head.left, head.right, 0.2))
+    at, line = profile_line(HeadGeometry(head.skin, half, head.normals, head.left, head.right, 0.2))
     assert np.isnan(line[at < -0.7]).all()
     assert np.isfinite(line[at > -0.5]).all()
 

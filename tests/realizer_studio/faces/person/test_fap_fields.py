@@ -7,7 +7,7 @@ import pytest
 
 from realizer.face.basis import BEYOND, FAPS, JAW_COS, JAW_DROP, JAW_SIN, LIMITS, TONGUE_COS, TONGUE_SIN
 from realizer.tables import faps
-from realizer_studio.faces.mpeg4.fields import WAYS
+from realizer_studio.faces.mpeg4.fields import DIRECTIONS
 from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.makehuman import Ground
 
@@ -24,9 +24,9 @@ def test_face_fields_serve_all_faps_but_turns(fields: Fields) -> None:
 
 def test_face_fields_move_each_feature_point_by_one(ground: Ground, fields: Fields) -> None:
     for row in faps()[2:]:
-        if row.fap in fields and row.direction in WAYS and row.feature_point in ground.points:
+        if row.fap in fields and row.direction in DIRECTIONS and row.feature_point in ground.points:
             move = fields[row.fap][ground.points[row.feature_point]]
-            assert move @ np.array(WAYS[row.direction]) == pytest.approx(1, abs=1e-6), row.name
+            assert move @ np.array(DIRECTIONS[row.direction]) == pytest.approx(1, abs=1e-6), row.name
 
 
 def test_face_fields_of_two_sides_mirror(ground: Ground, fields: Fields) -> None:

@@ -9,7 +9,7 @@ from realizer.face.basis import BEYOND, LIMITS
 from realizer.face.load import load_face
 from realizer.tables import faps
 from realizer_studio.faces.mpeg4.fap_measures import Measure, flips_of
-from realizer_studio.faces.mpeg4.fields import WAYS
+from realizer_studio.faces.mpeg4.fields import DIRECTIONS
 from realizer_studio.faces.person.makehuman import Ground
 from tests.shipped import FACES
 
@@ -21,7 +21,7 @@ def test_far_fields_move_each_feature_point_by_one(ground: Ground, fields: Field
     for fap in LIMITS:
         row = faps()[fap - 1]
         move = fields[BEYOND + fap][ground.points[row.feature_point]]
-        assert move @ np.array(WAYS[row.direction]) == pytest.approx(1), row.name
+        assert move @ np.array(DIRECTIONS[row.direction]) == pytest.approx(1), row.name
 
 
 def test_far_fields_of_two_sides_mirror(ground: Ground, fields: Fields) -> None:
