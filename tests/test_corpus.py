@@ -268,6 +268,22 @@ def blocks_pass_every_sync_point_in_order(case: Case) -> None:
             assert own == [f"{id}:{behaviour}:{point}" for point in points]
 
 
+def behaviours_that_began_end_before_their_block(case: Case) -> None:
+    """Each sync point `start` of a behaviour has its `end`, also if the block is interrupted or replaced."""
+    begun: set[str] = set()
+    for feedback in play_once(case).feedback:
+        behaviour, _, point = (
+            feedback.id.rpartition(":") if isinstance(feedback, SyncPointProgress) else [""] * 3
+        )
+        if point == "start":
+            begun.add(behaviour)
+        elif point == "end":
+            begun.remove(behaviour)
+        elif isinstance(feedback, BlockProgress) and feedback.id.endswith(":end"):
+            assert not [id for id in begun if id.startswith(feedback.id.removesuffix("end"))]
+    assert not begun
+
+
 def feedback_does_not_depend_on_the_calls_of_due(case: Case) -> None:
     """Live and offline agree: `due` is called at every deadline, or only when a document is sent."""
     punctual, seldom = play_once(case), play(case, punctual=False)
@@ -294,6 +310,7 @@ LAWS = (
     behaviours_have_one_warning,
     faces_never_jump,
     blocks_pass_every_sync_point_in_order,
+    behaviours_that_began_end_before_their_block,
     feedback_does_not_depend_on_the_calls_of_due,
     sessions_play_it_as_it_is_played_offline,
     documents_can_be_written_and_read_again,

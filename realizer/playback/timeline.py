@@ -14,7 +14,7 @@ from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent
 from realizer.playback.block_store import BlockStore
 from realizer.playback.character import Character
-from realizer.playback.feedback_events import EventQueue, Reports, prediction, progress
+from realizer.playback.feedback_events import EventQueue, Reports, prediction, progress, sync_progress
 from realizer.playback.joint_planner import Arrival, JointPlanner
 from realizer.playback.resources import conflicts
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
@@ -242,6 +242,9 @@ class BlockTimeline:
     def stop(self, playing: ActiveBlock, now: float, others: Collection[ActiveBlock] = ()) -> None:
         """Cut a block off at `now`: what plays relaxes, what waits is cancelled, and its end is reported.
 
+        The sync points that the cut makes true are reported before it: the end of each behaviour that has
+        begun, and its relax, if that has not passed.
+
         Blocks that wait and refer to one that has not started are planned again, without these references;
         not `others`, which are stopped with it.
         """
@@ -251,9 +254,19 @@ class BlockTimeline:
             tied = [p for p in tied if not p.refers_to(playing)]
         if playing.is_waiting:
             playing.pass_on_dependencies()
+        pending = self.events.pending(playing)
+        begun = (
+            [] if playing.is_waiting else [b for b in playing.schedule.times if (b, "start") not in pending]
+        )
         self.events.drop(playing)
         self._withdraw_shifts(playing, playing.shifts.keys(), now)
         playing.cut(list(playing.schedule.times), now, ends=True)
+        points = playing.schedule.points
+        true_now = [(b, s) for b in begun for s in points.get(b, ("end",)) if (b, s) in pending]
+        if changed := dict.fromkeys(b for b, _ in true_now if b in points):
+            self.predict(playing, now, changed)
+        for behaviour, sync in true_now:
+            self.reports.add(sync_progress(playing.block, behaviour, sync, now, playing.start))
         playing.stopped_at = now
         playing.change_state(BlockEvent.STOP)
         self.blocks.end(playing)
@@ -280,7 +293,10 @@ class BlockTimeline:
         pending = self.events.pending(playing)
         self.events.drop(playing)
         self._withdraw_shifts(playing, [b for b in behaviours if b in playing.shifts], now)
-        playing.cut(behaviours, now)
+        removed = playing.cut(behaviours, now)
+        for behaviour in removed if playing.has_begun else ():
+            if (behaviour, "start") not in pending:  # it has just been reported
+                self.reports.add(sync_progress(playing.block, behaviour, "end", now, playing.start))
         if playing.start < inf:
             self.events.add(playing, pending)
         self.mark_changed()

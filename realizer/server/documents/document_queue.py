@@ -122,6 +122,7 @@ class Submission:
         self._player = player
         self._add_effects = add_effects
         self._message = 0
+        self._followers = set[PendingBlock]()  # waited for the block that was planned last
 
     def work(self, t: float) -> bool:
         """Plan a block that is ready, or else read one. Return False if nothing has changed.
@@ -133,10 +134,14 @@ class Submission:
 
     @property
     def is_in_message(self) -> bool:
-        """Whether more of the message whose block was planned last can be read or planned."""
+        """Whether more of the message whose block was planned last can be read or planned.
+
+        Blocks that waited for that one belong to it, so that they are not late for its first sync points.
+        """
         if self.queue and self.queue.message == self._message:
             return True
-        return any(w.message == self._message and w.is_ready for w in self.pending.blocks)
+        together = (w for w in self.pending.blocks if w.message == self._message or w in self._followers)
+        return any(w.is_ready for w in together)
 
     @property
     def has_work(self) -> bool:
@@ -230,6 +235,7 @@ class Submission:
         if pending is None or (pending.utterances and self.queue and self.queue.message == pending.message):
             return False
         self._message = pending.message
+        self._followers = {other for other in self.pending.blocks if pending in other.predecessors}
         try:
             pending.block = self.speeches.with_links(pending.block)
             schedule = self._player.submit(pending.block, t, pending.utterances, pending.sender)

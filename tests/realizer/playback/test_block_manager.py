@@ -202,7 +202,8 @@ def test_accept_moves_no_block_that_it_ends() -> None:
         stage.send(id, wait(1), composition="APPEND")
     seen = len(stage.log)
     stage.send("x", wait(1), composition="REPLACE", at=0.5)
-    assert stage.log[seen:][1:6] == ["a:end INTERRUPTED 0.5", *(f"{id}:end REVOKED 0.5" for id in "bcde")]
+    ended = [line for line in stage.log[seen:] if ":end " in line]
+    assert ended[:5] == ["a:end INTERRUPTED 0.5", *(f"{id}:end REVOKED 0.5" for id in "bcde")]
 
 
 def test_replace_ends_playing_and_waiting_blocks_and_frees_their_ids(stage: Stage) -> None:

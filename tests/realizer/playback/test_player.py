@@ -101,8 +101,8 @@ def test_replace_ends_earlier_blocks_first_and_silences_them() -> None:
     player.due(1.0)
     submit(player, SMILE, "second", 'composition="REPLACE"', now=1.0)
     reported = [id for id, _ in progress(player.due(100.0))]
-    assert reported[:3] == ["first:end", "waiting:end", "second:start"]
-    assert not any(id.startswith(("first:s", "waiting:s")) for id in reported)
+    assert reported[:5] == ["first:s:relax", "first:s:end", "first:end", "waiting:end", "second:start"]
+    assert not any(id.startswith("waiting:s") for id in reported)
 
 
 def test_player_allows_an_id_again_after_its_end_or_a_replace() -> None:
@@ -134,7 +134,7 @@ def test_stop_ends_a_block_without_a_jump_of_the_face() -> None:
     player.due(1.0)
     before = au(player, "12L", 1.0)[0]
     assert player.stop(1.0) == ["b"]
-    assert progress(player.due(1.0)) == [("b:end", 1.0)]
+    assert progress(player.due(1.0)) == [("b:s:relax", 1.0), ("b:s:end", 1.0), ("b:end", 1.0)]
     times = np.arange(1.0, 1.6, 0.01)
     values = np.array(au(player, "12L", *times))
     assert values[0] == pytest.approx(before, abs=1e-6)

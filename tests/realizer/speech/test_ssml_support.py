@@ -13,7 +13,7 @@ from realizer.speech.utterance import SpeechRequest
 from tests.rows import each_row
 
 DOCS = Path(__file__).parents[3] / "docs" / "speech.md"
-ALL = set(
+ALL = frozenset(
     [
         "p",
         "s",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bml_schema import Block, BlockProgress, PredictionFeedback, WarningFeedback
+from bml_schema import Block, BlockProgress, PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
@@ -159,6 +159,20 @@ def test_submission_plans_all_documents_of_a_message_for_one_instant() -> None:
     starts = {f.id: f.global_time for f in client.feedback if isinstance(f, BlockProgress)}
     assert starts["a:start"] == starts["b:start"]
     assert "late" not in "".join(text for text in client.messages if isinstance(text, str))
+
+
+def test_submission_plans_blocks_that_waited_for_another_for_its_instant() -> None:
+    driver = Driver(mute=True)
+    driver.send('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>')
+    driver.send('<bml id="b"><head id="n" lexeme="NOD" start="a:s:start"/></bml>')
+    driver.now = 1.0
+    driver.say(driver.spoken[0].id, spoken())
+    while driver.session.has_documents:
+        driver.now += 0.01
+        driver.wake()
+    feedback = driver.run(5.0).feedback
+    times = {f.id: f.global_time for f in feedback if isinstance(f, BlockProgress | SyncPointProgress)}
+    assert times["a:s:start"] == times["b:start"] == times["b:n:start"]
 
 
 def test_submission_goes_on_after_a_standstill() -> None:
