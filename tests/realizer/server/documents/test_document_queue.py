@@ -166,7 +166,7 @@ def test_submission_plans_blocks_that_waited_for_another_for_its_instant() -> No
     driver.send('<bml id="a"><speech id="s"><text>Hi</text></speech></bml>')
     driver.send('<bml id="b"><head id="n" lexeme="NOD" start="a:s:start"/></bml>')
     driver.now = 1.0
-    driver.say(driver.spoken[0].id, spoken())
+    driver.session.on_speech(driver.spoken[0].id, spoken(), driver.opened + driver.now)
     while driver.session.has_documents:
         driver.now += 0.01
         driver.wake()
