@@ -39,6 +39,29 @@ def without_constraints(block: Block, gone: Sequence[Constraint]) -> Block:
     return block.with_children(lambda node, _: None if any(node is lost for lost in gone) else node)
 
 
+def without_references(block: Block, points: Collection[str]) -> Block:
+    """Return a block without the references of some of its sync points, "behaviour:sync"."""
+    if not points:
+        return block
+
+    def without_those(node: Behaviour | Constraint, _: bool) -> Behaviour | Constraint:
+        if isinstance(node, Constraint):
+            return node
+        return _without_points(
+            node, {point for point, _ in node.references if f"{node.id}:{point}" in points}
+        )
+
+    return block.with_children(without_those)
+
+
+def _without_points(node: Behaviour, lost: Collection[str]) -> Behaviour:
+    if not lost:
+        return node
+    if isinstance(node, Speech):
+        node = node.with_references(lambda sync: None if sync.id in lost else sync.ref)
+    return replace(node, syncs={p: ref for p, ref in node.syncs.items() if p not in lost})
+
+
 class ReferenceRemover:
     """Removes references to dropped behaviours; collects `lost_references` and `fatal` as in ReducedBlock."""
 
@@ -64,11 +87,7 @@ class ReferenceRemover:
 
     def _behaviour(self, node: Behaviour) -> Behaviour:
         lost = {point for point, ref in node.references if self._is_gone(ref, f"{node.id}:{point}")}
-        if not lost:
-            return node
-        if isinstance(node, Speech):
-            node = node.with_references(lambda sync: None if sync.id in lost else sync.ref)
-        return replace(node, syncs={p: ref for p, ref in node.syncs.items() if p not in lost})
+        return _without_points(node, lost)
 
     def _constraint(self, node: Constraint, required: bool) -> Constraint | None:
         name = node.id or (node.place.path if node.place else "constraint")

@@ -80,6 +80,9 @@ class BehaviourKind:
     stretch: Callable[[Any, PlanningContext], Timing | None] = lambda node, context: None
     # (node, context) -> its sound from start to end, or None
     sound: Callable[[Any, PlanningContext], Utterance | None] = lambda node, context: None
+    # (node, times (k,) seconds from block start) -> how its times differ from what the document says, in
+    # words, or "". Called after scheduling.
+    review: Callable[[Any, Float64], str] | None = None
     # (node, context) -> exclusive resources ("voice", "gaze", "head pitch") that it needs from start to relax
     # (to end if it has no relax): of two behaviours of a character with the same claim at one time one is
     # dropped. Expressions have no claims: they blend.

@@ -1,6 +1,6 @@
 """Steps 2 to 4 of the pipeline for one block: timings, schedule and channels."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bml_schema import Block, SyncRef, without
-from bml_schema.dropped_references import without_constraints
+from bml_schema.dropped_references import without_constraints, without_references
 from bml_schema.errors import listed
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
@@ -111,6 +111,8 @@ class _PlanBuilder:
         self.trims: dict[tuple[str, str], float] = {}
         # Speeches that are placed one after the other, as `Member.sequences`; None if they must not be.
         self.sequences: list[tuple[str | float, str | float]] | None = []
+        # Pairs of speeches, of which the second waits for the first.
+        self.turns: list[tuple[str, str]] = []
 
     def add_problems(self) -> None:
         for problem in self.block.problems:
@@ -159,13 +161,17 @@ class _PlanBuilder:
         trial = Trial([self.member(), *others], external_times, self.context.grace)
         settle(trial, [*RULES, *(partial(rule, self) for rule in GIVES_WAY)])
         # A dropped constraint must not bind the block when it is planned again, or others with it.
+        self.block = without_references(self.block, self.solved[0].released)
         self.block = without_constraints(self.block, self.lost_constraints)
+        more = (*self.solved[0].warnings, *self.waits(), *self.reviews())
+        self.solved[0] = replace(self.solved[0], warnings=more)
         return self.solved
 
     def member(self) -> Member:
         """Return what is left of the block, to be scheduled."""
         priorities = {node.id: node.priority for node in self.block.behaviours if node.priority}
-        return Member(self.block, self.timings, priorities=priorities, sequences=tuple(self.sequences or ()))
+        sequences = (*(self.sequences or ()), *self.turns)
+        return Member(self.block, self.timings, priorities=priorities, sequences=sequences)
 
     def begin_again(self, trial: Trial) -> bool:
         """Let what is left be solved again; constraints that were lost count again."""
@@ -220,6 +226,46 @@ class _PlanBuilder:
         self.sequences += new
         return self.begin_again(trial)
 
+    def speak_in_turn(self, trial: Trial) -> bool:
+        """The time of speech goes that has none of its own, or that ends after the speech it begins in."""
+        new = [pair for pair in self.found_turns() if pair not in self.turns]
+        self.turns += new
+        return bool(new) and self.begin_again(trial)
+
+    def found_turns(self) -> Iterator[tuple[str, str]]:
+        """Yield pairs of speeches of this block that conflict: one, and one that can wait for its end."""
+        last, released = "", {*self.solved[0].released}
+        for conflict in self.conflicts:
+            claim, winner = conflict.claim, conflict.winner
+            if claim.resource != "voice" or winner.block != claim.block:
+                continue
+            points = {f"{claim.behaviour}:{point}" for point, _ in self.block[claim.behaviour].references}
+            if points <= released:
+                yield winner.behaviour, claim.behaviour
+                if last:
+                    yield last, claim.behaviour
+                last = claim.behaviour
+            elif winner.begin < claim.begin and winner.end < claim.end:
+                yield winner.behaviour, claim.behaviour
+            elif claim.begin < winner.begin and claim.end < winner.end:
+                yield claim.behaviour, winner.behaviour
+
+    def waits(self) -> Iterator[Warning]:
+        """Yield a warning for each speech that waits for another one."""
+        schedule = self.solved[0]
+        for later, earlier in {later: earlier for earlier, later in self.turns}.items():
+            if later in schedule.times and f"{later}:start" not in schedule.released:
+                begin = float(schedule.times[later][0])
+                text = f"start: wanted a time at which nothing else is said; {later} waits for {earlier}"
+                yield self.warning("IMPOSSIBLE_TO_SCHEDULE", later, f"{text} until {begin:.3g} s")
+
+    def reviews(self) -> Iterator[Warning]:
+        """Yield a warning for each behaviour whose times are not what it says itself."""
+        for node in self.block.behaviours:
+            review = self.kinds[node.tag].review
+            if review is not None and (text := review(node, self.solved[0].times[node.id])):
+                yield self.warning("IMPOSSIBLE_TO_SCHEDULE", node.id, text)
+
     def drop_losers(self, trial: Trial) -> bool:
         """A behaviour goes that wants what another one has: one of an earlier block, or of higher rank."""
         losers = ((found.claim.behaviour, str(found)) for found in work.counted(self.conflicts, 10))
@@ -229,7 +275,7 @@ class _PlanBuilder:
     @property
     def is_incomplete(self) -> bool:
         """Whether some of the block could not be placed."""
-        return self.solved[0].failed or len(self.solved[0].times) < len(self.timings)
+        return self.solved[0].failed or self.solved[0].fit < (len(self.timings), 0)
 
     def expand(self, schedule: Schedule) -> dict[str, tuple[Channel, ...]]:
         """Step 4: return the channels of the scheduled behaviours, in seconds from block start."""
@@ -254,13 +300,13 @@ class _PlanBuilder:
             return schedule_together(members, outside=trial.outside, grace=trial.grace)[0]
 
         stretched = solved({**own.timings, **stretchable})
-        if stretched.failed or len(stretched.times) <= len(rigid.times):
+        if stretched.failed or stretched.fit <= rigid.fit:
             return {}
         points = {b: stretched.times[b] - stretched.times[b][0] for b in stretchable if b in stretched.times}
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in points}
         # Some voices have one rate for a whole speech. Of the rates of the stretched gaps, take the one with
         # which most behaviours can be scheduled.
-        best_count = len(rigid.times)
+        best = rigid.fit
         for b in points if len(points) == 1 else ():
             if stretchable[b].most is None or self.context.utterances[b].stretch == WARP:
                 continue
@@ -268,8 +314,8 @@ class _PlanBuilder:
             rates = np.diff(points[b])[gaps > MIN_RATE_GAP] / gaps[gaps > MIN_RATE_GAP]
             for rate in sorted({round(float(r), 9) for r in rates}, key=lambda r: abs(r - 1.0)):
                 at_rate = solved({**own.timings, b: replace(own.timings[b], preferred=gaps * rate)})
-                if not at_rate.failed and len(at_rate.times) > best_count:
-                    best_count = len(at_rate.times)
+                if not at_rate.failed and at_rate.fit > best:
+                    best = at_rate.fit
                     points[b] = natural[b] * rate
         return {
             b: dict(zip(stretchable[b].points[1:], map(float, points[b][1:]), strict=True))
@@ -320,6 +366,7 @@ GIVES_WAY: tuple[Callable[[_PlanBuilder, Trial], bool], ...] = (
     _PlanBuilder.leave_sequence,
     _PlanBuilder.leave_out_unplaced,
     _PlanBuilder.speak_in_sequence,
+    _PlanBuilder.speak_in_turn,
     _PlanBuilder.drop_losers,
 )
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from bml_schema import SyncRef
 from realizer.core import work
 from realizer.scheduling.problem import ORIGIN, Part, Problem, Relation
 from realizer.scheduling.timing import Clause, Warning
@@ -165,10 +166,56 @@ MAX_CLAUSES = 30
 def choose(clash: Conflict) -> Part | None:
     """Return the part to drop: an optional constraint before any behaviour, then the lowest priority.
 
-    Of equal ones it is the later in the document. A behaviour that is only referred to stays if another one
-    states a relation or gap. Return None if everything is required.
+    Of equal ones it is the later in the document; speech is the last. A behaviour that is only referred to
+    stays if another one states a relation or gap. Return None if everything is required.
     """
-    return max(clash.candidates, key=lambda part: (-part.priority, part.order), default=None)
+    return max(
+        clash.candidates, key=lambda part: (not part.is_spoken, -part.priority, part.order), default=None
+    )
+
+
+def choose_statement(clash: Conflict) -> Relation | None:
+    """Return the statement to give up so that no behaviour is dropped, or None.
+
+    Speech gives up the reference of its last point that has one; that of its start only if it is to another
+    behaviour, or if nothing else can go. Any behaviour gives up a start before the start of its block.
+    Optional constraints go first.
+    """
+    if any(part.is_constraint for part in clash.candidates):
+        return None
+    stated = [r for r in clash.relations if r.words[1] == "=" and r.u != ORIGIN and not r.part.required]
+    spoken = [r for r in stated if r.part.is_spoken and not r.part.is_constraint]
+    if later := [r for r in spoken if not _is_start(r)]:
+        return later[-1]
+    if starts := [r for r in spoken if r.v != ORIGIN or all(p.is_spoken for p in clash.candidates)]:
+        return starts[-1]
+    if clash.earliest is not None:
+        early = [r for r in stated if r.part is clash.earliest[0] and _is_start(r) and not _is_foreign(r)]
+        return early[-1] if early else None
+    return None
+
+
+def _is_start(relation: Relation) -> bool:
+    return relation.words[0] == f"{relation.part.name}:start"
+
+
+def _is_foreign(relation: Relation) -> bool:
+    """Return whether a relation refers to another block."""
+    ref = relation.words[2]
+    return isinstance(ref, SyncRef) and ref.block is not None
+
+
+def release_warning(relation: Relation, clash: Conflict, later: float) -> Warning:
+    """Return the warning for a statement that was given up; `later` has the seconds by which it is wrong."""
+    clauses = clash.clauses
+    by = f"{relation.words[0]} is {abs(later):.3g} s {'later' if later > 0 else 'earlier'}"
+    text = f"{relation.statement} was given up: {in_words(clauses)}; {by}"
+    return Warning(relation.part.id, IMPOSSIBLE, text, tuple(clauses))
+
+
+def unknown_warning(part: Part, sync: str, text: str) -> Warning:
+    """Return the warning for a reference of speech that has no time."""
+    return Warning(part.id, IMPOSSIBLE, f"{part.name}:{sync} was given up{_placed(part, part.line)}: {text}")
 
 
 def warning_of(clash: Conflict, dropped: Part) -> Warning:
@@ -217,7 +264,7 @@ def _relation(relation: Relation) -> str:
     left, sign, right = relation.words
     if sign == "rigid":
         return f"{left} takes exactly {_seconds(relation.seconds)} from its start to {right}"
-    return f"{left} {'is ' if sign != '=' else ''}{sign} {right}"
+    return relation.statement
 
 
 def _placed(part: Part, line: int | None) -> str:

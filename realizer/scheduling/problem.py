@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +30,8 @@ class Part:
     is_constraint: bool = False
     # the behaviours that a constraint names, as "block:behaviour"; it is dropped with any of them
     names: frozenset[str] = frozenset()
+    # it is speech: in a conflict it loses references of its own instead of being dropped
+    is_spoken: bool = False
 
 
 class Relation(NamedTuple):
@@ -44,6 +46,12 @@ class Relation(NamedTuple):
     seconds: float
     part: Part
     words: tuple[object, str, object]
+
+    @property
+    def statement(self) -> str:
+        """The relation in words, such as "s:end = 0.2"."""
+        left, sign, right = self.words
+        return f"{left} {'is ' if sign != '=' else ''}{sign} {right}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +94,10 @@ class Problem:
     faults: list[tuple[Part, str]] = field(default_factory=list)
     # the parts that refer to other blocks, of the new block
     external: list[Part] = field(default_factory=list)
+    # statements that were given up, so that the behaviours that make them stay
+    released: list[Relation] = field(default_factory=list)
+    # (behaviour, its sync point, why the reference of that point was given up at once)
+    unknown: list[tuple[Part, str, str]] = field(default_factory=list)
 
     def add(self, part: Part, timing: Timing, earliest: float = 0.0) -> int:
         """Add a behaviour; return the number of its first point."""
@@ -127,8 +139,18 @@ class Problem:
         for u, v, seconds, part, words in work.counted(self.orders):
             if id(part) not in gone and u in number and v in number:
                 smaller.orders.append(Relation(number[u], number[v], seconds, part, words))
+        for u, v, seconds, part, words in self.released:
+            if id(part) not in gone and u in number and v in number:
+                smaller.released.append(Relation(number[u], number[v], seconds, part, words))
         smaller.faults = [fault for fault in self.faults if id(fault[0]) not in gone]
+        smaller.unknown = [lost for lost in self.unknown if id(lost[0]) not in gone]
         return smaller
+
+    def released_from(self, statements: Iterable[Relation]) -> Problem:
+        """Return the problem without some equalities, whose behaviours stay."""
+        gone = {id(relation): relation for relation in statements}
+        kept = [relation for relation in self.equalities if id(relation) not in gone]
+        return replace(self, equalities=kept, released=[*self.released, *gone.values()])
 
 
 def problem_of(
@@ -159,6 +181,7 @@ def problem_of(
                 member.priorities.get(id, 0.0),
                 order,
                 place.line if place is not None else None,
+                is_spoken=node.marks,
             )
             # `_pass` bounds the future points of a block that has begun.
             earliest = -np.inf if id in member.passed_times else member.earliest
@@ -182,8 +205,15 @@ def problem_of(
             except LookupError as fault:
                 if member.is_fixed:
                     continue  # it plays already, and the point has been forgotten since
+                if part.is_spoken and not part.required:
+                    problem.unknown.append((part, sync, str(fault)))
+                    continue
                 problem.faults.append((part, str(fault)))
                 break
+            if not member.is_fixed and _is_backwards(node.id, sync, ref):
+                why = f"{ref} would leave it no length"
+                problem.unknown.append((part, sync, why))
+                continue
             if target[0] == ORIGIN and sync in passed:
                 continue  # the other end may have moved since
             words = (f"{part.name}:{sync}", "=", ref)
@@ -195,6 +225,15 @@ def problem_of(
         for order, constraint in enumerate(work.counted(member.block.constraints, 10)):
             _add_constraint(problem, resolvers[member.block.id], constraint, order)
     return problem
+
+
+def _is_backwards(id: str, sync: str, ref: SyncRef) -> bool:
+    """Return whether a behaviour begins at its own end, or ends at its own start."""
+    own = ref.behaviour == id and ref.block is None
+    return own and (
+        (sync == "start" and ref.sync == "end" and ref.offset >= 0)
+        or (sync == "end" and ref.sync == "start" and ref.offset <= 0)
+    )
 
 
 def _pass(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from math import inf
@@ -11,10 +11,19 @@ from typing import TypeAlias
 from bml_schema import SyncRef
 from realizer.core import work
 from realizer.core.array_types import Float64
-from realizer.scheduling.conflict import choose, fault_warning, refusal, warning_of
+from realizer.scheduling.conflict import (
+    Conflict,
+    choose,
+    choose_statement,
+    fault_warning,
+    refusal,
+    release_warning,
+    unknown_warning,
+    warning_of,
+)
 from realizer.scheduling.graphs import UnionFind
 from realizer.scheduling.model import TIGHT
-from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, problem_of
+from realizer.scheduling.problem import ORIGIN, Member, Part, Problem, Relation, problem_of
 from realizer.scheduling.solve import Solution, solve
 from realizer.scheduling.timing import Schedule, Warning
 
@@ -53,6 +62,7 @@ class Trial:
         problem: what is left of `whole`, the problem of all members.
         solution: of `problem`; None before it is solved, or if the new block is refused.
         lost, warnings: the dropped parts, and why.
+        released: statements that were given up, with their conflicts.
         late: behaviour of the new block -> seconds by which it starts too early if its references into other
             blocks hold; None if that was not asked.
     """
@@ -76,7 +86,8 @@ class Trial:
         self.solution: Solution | None = None
         self.failed = False
         self.lost: list[Part] = []
-        self.warnings: list[Warning] = []
+        self.released: list[tuple[Relation, Conflict]] = []
+        self.warnings = [unknown_warning(*reference) for reference in whole.unknown]
 
     @property
     def block(self) -> str:
@@ -87,6 +98,11 @@ class Trial:
         self.lost += dropped
         self.warnings += dropped.values()
         self.problem = self.problem.without(dropped)
+
+    def release(self, statements: Sequence[tuple[Relation, Conflict]]) -> None:
+        """Give up statements, whose behaviours stay."""
+        self.released += statements
+        self.problem = self.problem.released_from(relation for relation, _ in statements)
 
     def refuse(self, warning: Warning) -> None:
         """Refuse the new block."""
@@ -100,7 +116,7 @@ class Trial:
 
     def schedules(self) -> list[Schedule]:
         """Return the schedules of the members, or only that of the new block if it is refused."""
-        warnings, new = tuple(self.warnings), self.members[0].block
+        warnings, new = (*self.warnings, *self._release_warnings()), self.members[0].block
         if self.late:
             lateness = (self.late.get(w.id.removeprefix(f"{new.id}:"), 0.0) for w in warnings)
             warnings = tuple(
@@ -110,6 +126,8 @@ class Trial:
             return [Schedule(new.id, {}, {}, warnings=warnings[-1:], failed=True, character=new.character_id)]
         problem, found = self.problem, self.solution
         number = {part.id: n for n, part in enumerate(problem.behaviours)}
+        released = [str(relation.words[0]) for relation in problem.released]
+        released += [f"{part.name}:{sync}" for part, sync, _ in problem.unknown]
         schedules = []
         for member in self.members:
             times: dict[str, Float64] = {}
@@ -132,10 +150,19 @@ class Trial:
                     cost=found.cost,
                     late={name: seconds for name, seconds in member.late.items() if name in times},
                     lost_constraints=lost_constraints,
+                    released=tuple(released) if is_new else (),
                     character=member.block.character_id,
                 )
             )
         return schedules
+
+    def _release_warnings(self) -> Iterator[Warning]:
+        """Yield a warning for each statement that was given up, with how wrong it is."""
+        clashes = {relation.statement: clash for relation, clash in self.released}
+        for relation in self.problem.released if self.solution is not None else ():
+            at = self.solution.time
+            later = float(at[relation.u] - at[relation.v]) - relation.seconds
+            yield release_warning(relation, clashes[relation.statement], later)
 
 
 Rule: TypeAlias = Callable[[Trial], bool]
@@ -165,7 +192,8 @@ def drop_faults(trial: Trial) -> bool:
 def drop_clashes(trial: Trial) -> bool:
     """Of relations that cannot hold together, an optional constraint goes, or else a behaviour.
 
-    It is the one of the lowest priority, of equals the later one; the block, if all are required.
+    It is the one of the lowest priority, of equals the later one; the block, if all are required. Speech stays
+    and gives up a reference, and any behaviour gives up a start before its block.
     """
     if trial.failed:
         return False
@@ -174,15 +202,23 @@ def drop_clashes(trial: Trial) -> bool:
         trial.solution = clashes
         return False
     drops: dict[Part, Warning] = {}
+    releases: list[tuple[Relation, Conflict]] = []
+    changed: set[Part] = set()
     for clash in work.counted(clashes, 20):
-        # A conflict that a drop of this round may have settled is examined again in the next.
-        if not (drops.keys().isdisjoint(clash.parts) and drops.keys().isdisjoint(clash.named)):
+        # A conflict that a loss of this round may have settled is examined again in the next.
+        if not (changed.isdisjoint(clash.parts) and changed.isdisjoint(clash.named)):
             continue
-        part = choose(clash)
+        statement = choose_statement(clash)
+        part = choose(clash) if statement is None else statement.part
         if part is None:
             trial.refuse(refusal(trial.block, clash))
             return False
-        drops[part] = warning_of(clash, part)
+        if statement is not None:
+            releases.append((statement, clash))
+        else:
+            drops[part] = warning_of(clash, part)
+        changed.add(part)
+    trial.release(releases)
     trial.drop(drops)
     return True
 
@@ -195,13 +231,14 @@ def come_late(trial: Trial) -> bool:
     shorter, or dropped if that is not enough.
     """
     if trial.late is None:
-        if not (trial.grace > 0 and trial.warnings and trial.whole.external):
+        if not (trial.grace > 0 and (trial.warnings or trial.released) and trial.whole.external):
             return False
         trial.in_time = copy(trial)
         trial.late = _lateness(trial)
         shifts = {behaviour: min(seconds, trial.grace) for behaviour, seconds in trial.late.items()}
     else:
-        lost = {id.removeprefix(f"{trial.block}:") for part in trial.lost for id in (part.id, *part.names)}
+        parts = (*trial.lost, *(relation.part for relation, _ in trial.released))
+        lost = {id.removeprefix(f"{trial.block}:") for part in parts for id in (part.id, *part.names)}
         shifts = dict(trial.members[0].late)
         # Behaviours that are tied to each other are equally late.
         too_late = {trial.late[b] for b in lost & shifts.keys() if trial.late[b] > trial.grace}

@@ -106,6 +106,7 @@ class Schedule:
         over_limit: it failed because planning it takes too many steps.
         late: behaviour id -> seconds by which it is later than its references into other blocks say.
         lost_constraints: positions, in the block, of the constraints that were dropped by themselves.
+        released: sync points, "behaviour:sync", whose references were given up, so that the behaviours stay.
     """
 
     block: str
@@ -119,6 +120,7 @@ class Schedule:
     over_limit: bool = False
     late: Mapping[str, float] = field(default_factory=dict)
     lost_constraints: tuple[int, ...] = field(default=(), compare=False)
+    released: tuple[str, ...] = field(default=(), compare=False)
     character: str | None = field(default=None, compare=False)
 
     @cached_property
@@ -130,6 +132,11 @@ class Schedule:
     def end(self) -> float:
         """When the block ends, on the session clock."""
         return self.start + self.duration
+
+    @property
+    def fit(self) -> tuple[int, int]:
+        """How much of the block fits: more behaviours are better, then fewer given up references."""
+        return len(self.times), -len(self.released)
 
     @property
     def known(self) -> Schedule:

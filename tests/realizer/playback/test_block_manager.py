@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
@@ -317,11 +315,28 @@ def test_claims_of_an_earlier_block_keep_its_gaze(stage: Stage) -> None:
     assert "a:g" in stage.texts[0]
 
 
-@pytest.mark.parametrize("spoken", [lambda t: f'<speech id="s{t}"><text>{t}</text></speech>'])
-def test_claims_allow_one_speech_of_a_character_at_a_time(stage: Stage, spoken: Callable[[str], str]) -> None:
-    schedule = stage.send("a", spoken("one") + spoken("two"))
-    assert list(schedule.times) == ["sone"]
-    assert [line for line in stage.log if line[0] == "!"] == ["! a:stwo CANNOT_CREATE_BEHAVIOR"]
+def spoken(text: str, more: str = "") -> str:
+    return f'<speech id="s{text}"{more}><text>{text}</text></speech>'
+
+
+def test_claims_let_speeches_without_times_follow_each_other(stage: Stage) -> None:
+    schedule = stage.send("a", spoken("one") + spoken("two") + spoken("three"))
+    assert schedule.at("stwo", "start") == schedule.at("sone", "end")
+    assert schedule.at("sthree", "start") == schedule.at("stwo", "end")
+    warnings = [line for line in stage.log if line[0] == "!"]
+    assert warnings == ["! a:stwo IMPOSSIBLE_TO_SCHEDULE", "! a:sthree IMPOSSIBLE_TO_SCHEDULE"]
+    assert "waits for sone" in stage.texts[0]
+
+
+def test_claims_let_a_speech_wait_that_begins_before_the_end_of_another(stage: Stage) -> None:
+    schedule = stage.send("a", spoken("one") + spoken("two-and-three-and-four", ' start="0.1"'))
+    assert schedule.at("stwo-and-three-and-four", "start") == schedule.at("sone", "end")
+    assert ["start = 0.1 was given up" in text for text in stage.texts] == [True]
+
+
+def test_claims_drop_a_speech_inside_another(stage: Stage) -> None:
+    schedule = stage.send("a", spoken("one-and-two-and-three-and-four") + spoken("five", ' start="0.1"'))
+    assert list(schedule.times) == ["sone-and-two-and-three-and-four"]
 
 
 def test_claims_within_a_block_follow_priority(stage: Stage) -> None:

@@ -112,7 +112,7 @@ def check_same(one: Schedule, other: Schedule) -> None:
 def test_schedule_block_leaves_no_trace_of_dropped_parts(document: Document) -> None:
     """The rest has the same times as in a document without the dropped parts."""
     found = document.schedule()
-    assume(found.warnings)
+    assume(found.warnings and not found.released)
     gone = {w.id.removeprefix("b1:") for w in found.warnings}
     again = document.schedule(without=gone)
     assert not again.warnings
