@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from bml_schema.behaviours import Speech
+from bml_schema.behaviours import Speech, Wait
 from bml_schema.dropped_references import without
 from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Synchronize
 from bml_schema.sync_refs import SyncRef
@@ -48,6 +48,8 @@ def _timed(node: Behaviour, times: Mapping[str, float], fixed: list[Synchronize]
     """Return the behaviour with its times; add those that have no attribute to `fixed`."""
     at = {point: _number(f"{node.id}:{point}", time) for point, time in times.items()}
     syncs = {p: at.pop(p) for p in node.sync_points if p in at}
+    if isinstance(node, Wait) and node.duration:
+        node = replace(node, duration=max(times["end"] - times["start"], 0.0))
     if isinstance(node, Speech):
         node = node.with_references(lambda sync: at.pop(sync.id, None))
     for point, ref in at.items():

@@ -21,11 +21,12 @@ from bml_schema.document_splitter import (
     document_spans,
     without_doctype,
 )
-from bml_schema.element_reader import Vocabulary
+from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
 from bml_schema.node_schema import local
 from bml_schema.nodes import Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
+from bml_schema.speech_rescue import rescue
 from bml_schema.ssml import document_of, start_of_speak
 from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
@@ -273,11 +274,13 @@ class _Reader:
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
         report = translate(root, self.wrapper, self.block_ids)
-        if report or plain is None:
-            return block(begins={}, notes=(*notes, report.text) if report else notes)
-        if isinstance(plain, BMLError):
+        if isinstance(plain, BMLError) and not report:
             raise plain
-        return plain
+        rescued = rescue(root, ElementReader(self.vocabulary))
+        if isinstance(plain, Block) and not (report or rescued or _speech_is_lost(plain)):
+            return plain
+        begins = {} if report else begins
+        return block(begins=begins, notes=(*notes, report.text) if report else notes, rescued=rescued)
 
     def _read_strictly(self, root: etree._Element, block: Callable[..., Block]) -> Block:
         """Read BML 1.0 only; if there are faults, say of which dialect they are words."""
@@ -297,6 +300,10 @@ class _Reader:
         if plain.problems and (name := dialect()):
             return block(notes=(_NOT_READ.format(name),))
         return plain
+
+
+def _speech_is_lost(block: Block) -> bool:
+    return any(p.dropped and "/speech[" in p.path for p in block.problems)
 
 
 _NOT_READ = "this is {}, which is not read in strict BML"

@@ -68,14 +68,16 @@ class ElementReader:
         names: what references can name; None disables the check.
         lenient: whether other documents than BML 1.0 are read if their meaning is clear.
         remarks: faults that do not drop a behaviour, such as unknown attributes; the caller clears them.
+        forgiving: whether attributes with faults are left out, with a remark.
     """
 
-    __slots__ = ("lenient", "names", "remarks", "vocabulary")
+    __slots__ = ("forgiving", "lenient", "names", "remarks", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None, *, lenient: bool = True) -> None:
         self.vocabulary = vocabulary
         self.names = names
         self.lenient = lenient
+        self.forgiving = False
         self.remarks: list[Fault] = []
 
     def tag(self, element: etree._Element) -> str:
@@ -150,7 +152,10 @@ class ElementReader:
             if s.field not in values and s.name not in element.attrib:
                 faults.append(f"{s.name}: wanted {s.value.wanted}, got none")
         unknown = self.describe_unknown(schema, element, foreign, timed) if foreign else ""
-        if faults:
+        if faults and self.forgiving and all(s.field in values for s in schema.required):
+            text = f"{'; '.join(faults)}; left out"
+            self.remarks.append(Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
+        elif faults:
             raise Fault("; ".join([*faults, unknown] if unknown else faults), element)
         if unknown:
             self.remarks.append(Fault(unknown, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))

@@ -92,10 +92,17 @@ class Problem:
 
 
 class Fault(Exception):
-    """A fault of an element; it becomes the Problem of the behaviour or constraint around it."""
+    """A fault of an element; it becomes the Problem of the behaviour or constraint around it.
 
-    def __init__(self, text: str, element: _Element, type: str = PARSING_FAILURE) -> None:
+    Attributes:
+        path: of the element in its behaviour, if that is not where the element is now; else None.
+    """
+
+    def __init__(
+        self, text: str, element: _Element, type: str = PARSING_FAILURE, path: str | None = None
+    ) -> None:
         super().__init__(text)
+        self.path = path
         self.text = text
         self.element = element
         self.type = type

@@ -123,6 +123,20 @@ def local(tag: str) -> str:
     return tag.rpartition("}")[2]
 
 
+def path_below(element: Any, top: Any, path: str) -> str:
+    """Return the path of an element inside `top`, whose path is given."""
+    steps = ""
+    while element is not top:
+        parent = element.getparent()
+        if parent is None:
+            break
+        name = local(str(element.tag))
+        n = 1 + sum(local(str(e.tag)) == name for e in element.itersiblings(preceding=True))
+        steps = f"/{name}[{n}]{steps}"
+        element = parent
+    return path + steps
+
+
 def camel(name: str) -> str:
     """Return a name in camelCase: offset_angle -> offsetAngle."""
     head, *tail = name.split("_")

@@ -7,11 +7,13 @@ Unknown attributes are reported too, and nothing is dropped because of them.
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from lxml import etree
 
+from bml_schema.behaviours import Speech
 from bml_schema.block_outline import BlockOutline, Entry, flat
 from bml_schema.canonical import attributes
 from bml_schema.dropped_references import ReferenceRemover
@@ -29,11 +31,12 @@ from bml_schema.errors import (
     listed,
     quoted,
 )
-from bml_schema.node_schema import local, schema_of
+from bml_schema.node_schema import local, path_below, schema_of
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names
-from bml_schema.values import block_names, describe_mismatch
+from bml_schema.values import block_names, describe_mismatch, is_name
+from bml_schema.values import name as NAME
 
 MAX_BEHAVIOURS = 10_000  # in one block; scheduled in about a second
 # BMLA writes this in composition or in an attribute of its own.
@@ -51,6 +54,7 @@ def read_block(
     max_behaviours: int = MAX_BEHAVIOURS,
     lenient: bool = True,
     notes: Sequence[str] = (),
+    rescued: Mapping[etree._Element, Sequence[Fault]] | None = None,
 ) -> Block:
     """Read the block of a <bml> element.
 
@@ -62,6 +66,8 @@ def read_block(
         max_behaviours: the limit of behaviours and constraints together.
         lenient: what is not BML 1.0 is read where its meaning is plain.
         notes: what was read as something else; they become one Problem of the block.
+        rescued: speech -> what was wrong with it (`speech_rescue`); attributes of speech with faults are then
+            left out. None drops speech with faults.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
@@ -78,7 +84,7 @@ def read_block(
     names = elements.names = Names(values["id"])
     outline = BlockOutline(elements, names)
     tree = outline.entries(root, "/bml", required=False)
-    reader = _Reader(outline, lines)
+    reader = _Reader(outline, lines, rescued)
     if (count := len(flat(tree))) > max_behaviours:
         text = f"wanted at most {max_behaviours} behaviours and constraints in a block, got {count}"
         raise BMLSizeError(text, line=line, path="/bml", block=names.block)
@@ -175,9 +181,15 @@ class _Lines(NamedTuple):
 class _Reader:
     """The state of reading one block."""
 
-    __slots__ = ("elements", "line", "names", "owners", "places", "problems")
+    __slots__ = ("elements", "line", "names", "owners", "places", "problems", "rescued")
 
-    def __init__(self, outline: BlockOutline, lines: _Lines) -> None:
+    def __init__(
+        self,
+        outline: BlockOutline,
+        lines: _Lines,
+        rescued: Mapping[etree._Element, Sequence[Fault]] | None,
+    ) -> None:
+        self.rescued = rescued
         self.elements = outline.elements
         self.names = outline.names
         self.owners = outline.owners
@@ -198,6 +210,10 @@ class _Reader:
         """Return the node of an entry, or None, with a Problem, if it is dropped."""
         next_element()
         remarks = self.elements.remarks
+        if self.rescued is not None and entry.kind.cls is Speech:
+            self.elements.forgiving = not entry.required
+            remarks += self.rescued.get(entry.element, ())
+            entry = entry if entry.required else self.with_id(entry)
         try:
             is_constraint = entry.kind.tag == Constraint.tag
             node = self.constraint(entry) if is_constraint else self.behaviour(entry)
@@ -205,6 +221,7 @@ class _Reader:
             self.problem(self.warned(entry), fault, entry.path, entry.element, entry.required)
             node = None
             remarks.clear()
+        self.elements.forgiving = False
         for remark in remarks:
             self.problem(self.warned(entry), remark, entry.path, entry.element, dropped=False)
         remarks.clear()
@@ -221,6 +238,22 @@ class _Reader:
         node: Behaviour = self.elements.node(cls, element, timed=True)
         self.places[node.id] = Place(self.line(element), entry.path)
         return node
+
+    def with_id(self, entry: Entry) -> Entry:
+        """Return the entry of a speech with an id of its own, with a remark if it had none."""
+        wrong = ""
+        if not is_name(entry.id):
+            wrong = f"id: wanted {NAME.wanted}, got {quoted(entry.id) if entry.id else 'none'}"
+        if not wrong and self.owners.get(entry.id, entry) is entry:
+            return entry
+        id = next(id for n in count(1) if (id := f"speech{n}") not in self.owners)
+        reason = wrong or f"id: wanted one of its own, got {quoted(entry.id)}"
+        element = entry.element
+        element.set("id", id)
+        text = f'{reason}; it is called "{id}"'
+        self.elements.remarks.append(Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
+        self.owners[id] = entry = entry._replace(id=id)
+        return entry
 
     def unknown(self, entry: Entry) -> Fault:
         tag, element = entry.kind.tag, entry.element
@@ -278,7 +311,7 @@ class _Reader:
         required: bool = False,
         dropped: bool = True,
     ) -> None:
-        where = _path_below(fault.element, element, path)
+        where = path_below(fault.element, element, path) if fault.path is None else path + fault.path
         line = self.line(fault.element)
         self.problems.append(
             Problem(
@@ -291,17 +324,3 @@ class _Reader:
                 dropped=dropped,
             )
         )
-
-
-def _path_below(element: etree._Element, top: etree._Element, path: str) -> str:
-    """Return the path of an element inside `top`, whose path is given."""
-    steps = ""
-    while element is not top:
-        parent = element.getparent()
-        if parent is None:
-            break
-        name = local(str(element.tag))
-        n = 1 + sum(local(str(e.tag)) == name for e in element.itersiblings(preceding=True))
-        steps = f"/{name}[{n}]{steps}"
-        element = parent
-    return path + steps

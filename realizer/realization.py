@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from bml_schema import Feedback, WarningFeedback
+from bml_schema import VOCABULARY, Feedback, Wait, WarningFeedback
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.animation.frames import AUFrames, FAPFrames
@@ -69,6 +69,7 @@ class Realization:
         warnings: all of them, in order.
         refusals: reasons of refused documents and blocks.
         speeches: the utterances with their times.
+        plays_nothing: something was asked for, and nothing of it is heard or moves the face.
     """
 
     fps: float
@@ -84,6 +85,7 @@ class Realization:
     mapping: FapMapping = field(default_factory=standard)
     face_changes: tuple[FaceChange, ...] = ()
     blocks: BlockStore | None = field(default=None, repr=False)
+    plays_nothing: bool = False
 
     @property
     def has_content(self) -> bool:
@@ -263,7 +265,26 @@ def realization_of(
         deformer=options.deformer,
         mapping=mapping,
         blocks=player.blocks,
+        plays_nothing=bool(refused or any(s.dropped or s.failed for s in schedules) or _wants(player))
+        and not _plays(player),
     )
+
+
+def _wants(player: Player) -> bool:
+    """Return whether a block has behaviours that are more than times and commands."""
+    nodes = (node for active in player.blocks.all() for node in active.block.behaviours)
+    return any(player.kinds[node.tag].command is None and not isinstance(node, Wait) for node in nodes)
+
+
+def _plays(player: Player) -> bool:
+    """Return whether anything is heard or moves the face, beside idle motion; plug-ins may do more."""
+    blocks = player.blocks.all()
+    if any(active.shifts or any(active.channels.values()) for active in blocks):
+        return True
+    if any(node.tag not in VOCABULARY for active in blocks for node in active.block.behaviours):
+        return True
+    sounds = (speaking.utterance.pcm for speaking in player.speech())
+    return any(pcm is not None and pcm.any() for pcm in sounds)
 
 
 def frame_times(duration: float, fps: float) -> list[Float64]:

@@ -100,6 +100,7 @@ class Realization(realization.Realization):
         more = f" and {len(self.schedules) - 3} more" if len(self.schedules) > 3 else ""
         count = len(self.warnings)
         warned = f"; {count} warning{'s' * (count > 1)}" if count else ""
+        warned += "; nothing is heard or moves" if self.plays_nothing else ""
         length = f"{self.duration:.2f} s, {self.frames} frames at {self.fps:g} fps"
         return f"<Realization of {blocks}{more}: {length}, face {self.face_name}{warned}>"
 

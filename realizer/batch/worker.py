@@ -11,6 +11,7 @@ from realizer.core.errors import RealizerError, VoiceError
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.pipeline import play
+from realizer.realization import Realization
 from realizer.render.renderer import Renderer
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
 
@@ -96,7 +97,7 @@ class Worker:
         row = {
             "document": task.name,
             "key": task.key,
-            "status": "refused" if realization.refusals or not realization.has_content else "done",
+            "status": "done" if _is_done(realization) else "refused",
             "duration": round(realization.duration, 6),
             "frames": realization.frames,
             "characters": [name or "" for name in realization.characters],
@@ -136,6 +137,11 @@ class Worker:
                 settings = replace(settings, renderer=self._renderers[size, alpha])
             self._render_settings[suffix] = settings
         return self._render_settings[suffix]
+
+
+def _is_done(realization: Realization) -> bool:
+    played = realization.has_content and not realization.plays_nothing
+    return played and not realization.refusals
 
 
 # The worker of this process with its fingerprint. It does one task at a time, for several threads as well.

@@ -9,9 +9,10 @@ from realizer.checking.finding import FindingBuilder, Label
 from realizer.scheduling.timing import Clause, Warning
 
 _RELATION = re.compile(r"(\S+) (?:is )?(=|not before|not after) (.+)")
-_CANNOT = re.compile(r".+? cannot be (?:placed|kept)")
+_CANNOT = re.compile(r".+? (?:cannot be (?:placed|kept)|was given up)")
 _DANGLING = re.compile(
-    r"(?:required: )?(\S.*?) was dropped(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
+    r"(?:required: )?(\S.*?)(?: was dropped|:\S+ was given up)"
+    r"(?: \((?:(constraint)(?: (\S+))?, )?line (\d+)\))?: (.+)"
 )
 _REFERENCE = re.compile(r"([^:\s]+(?: [^:\s]+)*:\S+(?: [+-] [\d.]+)?)(?=:? )")
 _BECAUSE = re.compile(r"; (\S+ was dropped because .+)$|; (a constraint that .+)$|(all of this is required)$")

@@ -56,4 +56,5 @@ def explain(
             write = WRITERS.get(output.suffix.lower())
             page = as_html(steps, played).encode() if write is None else write(as_picture(steps, played))
             output.write_bytes(page)
-    return 1 if played.refusals or (strict and any(s.dropped for s in played.schedules)) else 0
+    dropped = any(schedule.dropped for schedule in played.schedules)
+    return 1 if played.refusals or played.plays_nothing or (strict and dropped) else 0

@@ -133,6 +133,9 @@ def play_documents(
             text = f"{path}: shows {first}, not {', '.join(others)}: the format holds one; see --character"
             click.echo(text, err=True)
     dropped = any(schedule.dropped for schedule in realization.schedules)
+    if realization.plays_nothing:
+        click.echo("nothing is heard or moves, though something was asked for", err=True)
+        return 1
     return 1 if realization.refusals or (flags["strict"] and dropped) else 0
 
 

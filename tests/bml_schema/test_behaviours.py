@@ -20,6 +20,7 @@ from bml_schema import (
     SyncRef,
     Wait,
     parse,
+    read,
     write,
 )
 from bml_schema.node_schema import schema_of
@@ -182,10 +183,14 @@ def test_speech_text_keeps_its_language() -> None:
         ("<txt>Hello</txt>", "wanted <text>, got <txt>"),
     ],
 )
-def test_speech_refuses_wrong_content(inside: str, said: str) -> None:
+def test_speech_with_wrong_content_is_spoken_with_a_warning(inside: str, said: str) -> None:
     block = only(f"<speech id='s'>{inside}</speech>")
-    assert not block.behaviours
+    assert [b.id for b in block.behaviours] == ["s"]
     assert block.problems[0].text.startswith(said)
+    assert not block.problems[0].dropped
+    (strict,) = read(f"<bml xmlns='{CORE}' id='b'><speech id='s'>{inside}</speech></bml>", strict_bml=True)
+    assert isinstance(strict, Block)
+    assert not strict.behaviours
 
 
 def test_posture_has_one_stance_and_any_poses() -> None:

@@ -94,7 +94,9 @@ def test_save_writes_nothing_if_no_block_plays(tmp_path: Path) -> None:
 def test_repr_is_one_line(played: realizer.Realization) -> None:
     assert repr(played) == "<Realization of b: 1.00 s, 26 frames at 25 fps, face ada>"
     text = "".join(f"<bml id='{k}'><head id='h' lexeme='NOD' amount='7'/></bml>" for k in "abcd")
-    assert re.search(r"of a, b, c and 1 more: .*; 4 warnings>", repr(realizer.realize(text)))
+    assert re.search(
+        r"of a, b, c and 1 more: .*; 4 warnings; nothing is heard or moves>", repr(realizer.realize(text))
+    )
 
 
 @pytest.mark.gl

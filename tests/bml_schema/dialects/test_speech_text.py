@@ -43,9 +43,9 @@ def test_speech_has_the_words_of_its_attribute_and_its_language() -> None:
     assert speech.text.language == "en-GB"
 
 
-def test_speech_of_words_alone_is_a_fault_in_no_dialect() -> None:
+def test_speech_of_words_alone_is_spoken_in_any_dialect() -> None:
     (problem,) = only("<speech id='s'>Hello</speech>").problems
-    assert problem.text == 'wanted elements, got the text "Hello", put it into <text>'
+    assert problem.text == 'wanted elements, got the text "Hello", put it into <text>; it is spoken'
     (block,) = read("<act><bml><speech>Hello</speech></bml></act>")
     assert isinstance(block, Block)
     assert parts(block) == ["Hello"]

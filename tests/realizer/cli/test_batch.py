@@ -59,7 +59,8 @@ def test_batch_says_whom_formats_of_one_character_leave_out(talks: Path, tmp_pat
 
 
 def test_batch_exits_with_1_for_a_dropped_behaviour_if_strict(talks: Path, tmp_path: Path) -> None:
-    (talks / "a.bml").write_text('<bml id="b"><faceLexeme id="f" lexeme="NOPE"/></bml>')
+    text = '<bml id="b"><faceLexeme id="f" lexeme="NOPE"/><head id="c" lexeme="NOD"/></bml>'
+    (talks / "a.bml").write_text(text)
     command = [str(talks), "-o", str(tmp_path / "out"), "--format", "fap", "--workers", "1"]
     assert batch(*command).return_value == 0
     assert batch(*command, "--strict").return_value == 1

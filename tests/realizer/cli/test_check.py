@@ -79,7 +79,7 @@ CASES = {
         ["v"],
         "there is w",
     ),
-    "text": ("<speech id='s'><text>a<b/></text></speech>", ["b"], ""),
+    "text": ("<speech id='s'><text>a<b/></text></speech>", ["speech"], ""),
     "body": ('<head id="n" lexeme="NOD">words</head>', ["head"], ""),
 }
 
