@@ -8,6 +8,8 @@ from dataclasses import replace
 from math import inf
 from typing import TypeAlias
 
+import numpy as np
+
 from bml_schema import SyncRef
 from realizer.core import work
 from realizer.core.array_types import Float64
@@ -159,8 +161,8 @@ class Trial:
     def _release_warnings(self) -> Iterator[Warning]:
         """Yield a warning for each statement that was given up, with how wrong it is."""
         clashes = {relation.statement: clash for relation, clash in self.released}
-        for relation in self.problem.released if self.solution is not None else ():
-            at = self.solution.time
+        at = np.zeros(0) if self.solution is None else self.solution.time
+        for relation in self.problem.released if len(at) else ():
             later = float(at[relation.u] - at[relation.v]) - relation.seconds
             yield release_warning(relation, clashes[relation.statement], later)
 
@@ -192,8 +194,8 @@ def drop_faults(trial: Trial) -> bool:
 def drop_clashes(trial: Trial) -> bool:
     """Of relations that cannot hold together, an optional constraint goes, or else a behaviour.
 
-    It is the one of the lowest priority, of equals the later one; the block, if all are required. Speech stays
-    and gives up a reference, and any behaviour gives up a start before its block.
+    It is the one of the lowest priority, of equals the later one; the block, if all are required. Speech
+    stays and gives up a reference, and any behaviour gives up a start before its block.
     """
     if trial.failed:
         return False
