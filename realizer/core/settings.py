@@ -18,7 +18,7 @@ log = logging.getLogger(__name__)
 
 PREFIX = "REALIZER_"
 # Variables that are read elsewhere.
-OTHERS = {f"REALIZER_{name}" for name in ("DRAW", "FACES", "HEAD_DATA", "NO_PAGE")}
+OTHERS = {"REALIZER_DRAW", "REALIZER_FACES", "REALIZER_HEAD_DATA", "REALIZER_NO_PAGE"}
 
 
 class SettingsError(RealizerError, ValueError):
@@ -326,13 +326,14 @@ class Settings:
             except (OSError, ValueError) as error:
                 raise SettingsError(f"{file}: wanted settings in TOML, got: {error}") from None
         sources = dict.fromkeys(values, str(file))
+        variables = [name.removeprefix(PREFIX).upper() for name in (*known, *OTHERS)]
         for name in sorted(name for name in environment.keys() - OTHERS if name.startswith(PREFIX)):
             setting = name.removeprefix(PREFIX).lower()
             if setting in known:
                 values[setting], sources[setting] = environment[name], name
-            elif closest := _closest(setting, known):
+            elif closest := _closest(setting.upper(), variables):
                 # A misspelt REALIZER_TOKEN would leave the service open.
-                raise SettingsError(f"variable {name}: wanted {PREFIX}{closest.upper()}?")
+                raise SettingsError(f"variable {name}: wanted {PREFIX}{closest}?")
             else:
                 log.warning("variable %s: no setting has this name, so it changes nothing", name)
         if unknown := sorted(values.keys() - known):

@@ -38,7 +38,13 @@ def test_settings_name_a_wrong_value() -> None:
 
 @pytest.mark.parametrize(
     ("variable", "meant"),
-    [("TOKN", "TOKEN"), ("MAX_MEMROY", "MAX_MEMORY"), ("JWTKEY", "JWT_KEY"), ("ORIGIN", "ORIGINS")],
+    [
+        ("TOKN", "TOKEN"),
+        ("MAX_MEMROY", "MAX_MEMORY"),
+        ("JWTKEY", "JWT_KEY"),
+        ("ORIGIN", "ORIGINS"),
+        ("DRAWS", "DRAW"),
+    ],
 )
 def test_settings_refuse_a_misspelt_variable(variable: str, meant: str) -> None:
     with pytest.raises(SettingsError, match=rf"variable REALIZER_{variable}: wanted REALIZER_{meant}\?"):
