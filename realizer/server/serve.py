@@ -174,6 +174,7 @@ class Server:
 
     def __init__(self, settings: Settings | None = None, worker: int | None = None) -> None:
         self.settings = settings or Settings()
+        self._worker = worker
         self._hub = Hub(self.settings, worker)
         self._web = HttpServer(self._hub)
         self.transports: list[Transport] = []
@@ -209,7 +210,9 @@ class Server:
         """
         await self._hub.ready()
         try:
-            others = (make(self._sessions, self.settings) for make in requested(self.settings))
+            # Of several processes, the first one opens what can be open only once.
+            wanted = () if self._worker else requested(self.settings)
+            others = (make(self._sessions, self.settings) for make in wanted)
             for transport in (self._web, *others):
                 if transport is not None:
                     await transport.start()

@@ -17,7 +17,6 @@ import socket
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from multiprocessing.process import BaseProcess
-from typing import Any
 from urllib.parse import parse_qs, unquote
 
 from realizer.core.errors import RealizerError
@@ -26,7 +25,6 @@ from realizer.core.settings import Settings
 from realizer.server.runtime.session_registry import worker_of
 from realizer.server.runtime.worker_aggregation import aggregate, is_for_all_workers
 from realizer.server.transports.tcp_listener import listen
-from realizer.server.transports.transport import TRANSPORTS
 
 log = logging.getLogger(__name__)
 
@@ -235,8 +233,5 @@ def _work(
 ) -> None:
     write_words(level, f"worker {number}: ")
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to the parent, which ends the workers
-    if number:  # other transports than the WebSocket are open in the first worker only
-        off: dict[str, Any] = {name: None for name in TRANSPORTS if hasattr(settings, name)}
-        settings = replace(settings, **off)
     control.setblocking(False)
     serve(replace(settings, port=port), number, control)
