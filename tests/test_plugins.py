@@ -120,7 +120,13 @@ def test_plugins_include_the_package_of_the_documentation(site: Path, tmp_path: 
 def test_plugins_of_the_documentation_and_the_example_have_different_names() -> None:
     example = tomllib.loads((ROOT / "examples" / "plugin" / "pyproject.toml").read_text("utf-8"))["project"]
     for group, rows in PROJECT["entry-points"].items():
-        assert not rows.keys() & example["entry-points"][group].keys()
+        assert not rows.keys() & example["entry-points"].get(group, {}).keys()
+
+
+def test_plugins_bring_a_command(site: Path) -> None:
+    said = run(site, "sneer", "Yuck.").stdout
+    assert re.search(r"sneer +Print a document", run(site, "--help").stdout)
+    assert run(site, "check", "-", document=said).stdout == ""
 
 
 def test_plugins_bring_a_behaviour_and_an_output(site: Path, tmp_path: Path) -> None:

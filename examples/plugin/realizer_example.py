@@ -1,8 +1,9 @@
-"""A behaviour, an output, a voice, a transport and a face, added to bml-realizer by entry points."""
+"""A behaviour, output, voice, transport, face and editor, added to bml-realizer by entry points."""
 
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 import shutil
 from dataclasses import replace
@@ -115,3 +116,17 @@ class Client:
 FACES = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "realizer-example"
 if not (FACES / "eve" / "face.toml").is_file():
     shutil.copytree(folder_of("ada"), FACES / "eve", dirs_exist_ok=True)
+
+# An editor: it answers {"id": 1, "text": "hello"} at ws://HOST:PORT/capitals by {"id": 1, "text": "HELLO"}.
+
+
+class Capitals:
+    def __init__(self, settings, may_save):
+        self.may_save = may_save
+
+    def answer(self, message):
+        asked = json.loads(message)
+        return json.dumps({"id": asked["id"], "text": asked["text"].upper()})
+
+    def close(self):
+        """Nothing is held."""

@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from websockets.sync.client import connect
 
 import realizer
 
@@ -55,12 +56,12 @@ def run(home: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 def test_example_is_short() -> None:
     lines = [line for file in EXAMPLE.iterdir() if file.is_file() for line in file.read_text().splitlines()]
-    assert len(lines) < 150
+    assert len(lines) < 165
 
 
 def test_plugins_lists_one_of_each_kind(home: Path) -> None:
     rows = json.loads(run(home, "plugins", "--json").stdout)
-    kinds = ["behaviours", "outputs", "voices", "transports", "faces"]
+    kinds = ["behaviours", "outputs", "voices", "transports", "faces", "editors"]
     assert [row["group"] for row in rows] == [f"realizer.{kind}" for kind in kinds]
     assert {row["package"] for row in rows} == {"realizer-example"}
     assert not [row["fault"] for row in rows if row["fault"]]
@@ -101,7 +102,14 @@ def test_transport_takes_lines_and_sends_feedback(home: Path, workers: str) -> N
     )
     try:
         assert service.stdout is not None
-        next(line for line in service.stdout if f"lines: text at 127.0.0.1:{port}" in line)
+        said, address = "", None
+        while address is None or f"lines: text at 127.0.0.1:{port}" not in said:
+            said += (line := service.stdout.readline())
+            assert line, said
+            address = re.search(r"listening on (ws://\S+)/ws", said)
+        with connect(f"{address[1]}/capitals") as page:
+            page.send('{"id": 1, "text": "hello"}')
+            assert json.loads(page.recv()) == {"id": 1, "text": "HELLO"}
         with socket.create_connection(("127.0.0.1", int(port))) as client, client.makefile("rw") as stream:
             for line in ("Hello", WINK):
                 stream.write(line + "\n")
