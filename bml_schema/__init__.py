@@ -31,7 +31,7 @@ from bml_schema.bmla import (
     ParameterValueChange,
     Trajectory,
 )
-from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, made_ids, parse, read
+from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, made_ids, parse, parse_all, read
 from bml_schema.dropped_references import ReducedBlock, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
 from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Listen, Mood, Timeline
@@ -78,6 +78,6 @@ __all__ = [
     "Posture", "PostureShift", "PredictionFeedback", "Problem", "ReducedBlock", "Required", "Speech",
     "SpeechText", "Stance", "Sync", "SyncPointProgress", "SyncRef", "Synchronize", "Timeline", "Trajectory",
     "Value", "Wait", "WarningFeedback", "attribute", "child", "children", "flag", "integer", "made_ids",
-    "mixed", "node", "number", "one_of", "parse", "parse_feedback", "prediction_of", "read", "seconds",
-    "string", "sync_ref", "text", "with_absolute_times", "without", "word", "write",
+    "mixed", "node", "number", "one_of", "parse", "parse_all", "parse_feedback", "prediction_of", "read",
+    "seconds", "string", "sync_ref", "text", "with_absolute_times", "without", "word", "write",
 ]  # fmt: skip

@@ -1,12 +1,11 @@
 """The reader of documents: decoding, limits, well-formedness, several documents in one text."""
 
-import codecs
 import re
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, islice
+from itertools import count
 from typing import Any
 
 from lxml import etree
@@ -22,7 +21,8 @@ from bml_schema.document_splitter import (
     without_doctype,
 )
 from bml_schema.element_reader import ElementReader, Vocabulary
-from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, quoted
+from bml_schema.encodings import decode, is_declared, without_controls
+from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError
 from bml_schema.node_schema import local
 from bml_schema.nodes import Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
@@ -38,10 +38,8 @@ MAX_DOCUMENTS = 1000  # in one text, so that a text full of "<bml>" does not cau
 
 
 _LONG_TAG = re.compile(rb"<([^\s<>/!?]++)[^<>\n]*+\n[^<>]*+>")
+_WORDS = re.compile(r"<(?:[\w.-]+:)?(?:text|speech)[\s/>]")
 _ID = re.compile(r"""\sid\s*=\s*(?:"([^"<]*)"|'([^'<]*)')""")
-_ENCODING = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-# Some of Python's other codecs are slow enough for an attack.
-_CODECS = {"utf-8", "utf-16", "ascii", "iso8859-1", "iso8859-15", "cp1252"}
 
 
 def made_ids() -> Iterator[str]:
@@ -68,6 +66,8 @@ def parse(
         max_bytes, max_behaviours: limits of a document.
         strict_bml: whether to read BML 1.0 only, without dialects and lenient parsing.
 
+    `parse_all` returns the blocks of several documents.
+
     Returns:
         The block; `problems` has what was dropped from it.
 
@@ -76,23 +76,49 @@ def parse(
             usable id, or it is not one document.
         TypeError: `text` is neither str nor bytes.
     """
+    blocks = parse_all(
+        text,
+        vocabulary,
+        strict=strict,
+        max_bytes=max_bytes,
+        max_behaviours=max_behaviours,
+        strict_bml=strict_bml,
+    )
+    if len(blocks) > 1:
+        text = f"wanted one document, got {len(blocks)}; `bml_schema.parse_all` returns a list of them"
+        raise BMLError(text)
+    return blocks[0]
+
+
+def parse_all(
+    text: str | bytes,
+    vocabulary: Vocabulary = VOCABULARY,
+    *,
+    strict: bool = False,
+    max_bytes: int = MAX_BYTES,
+    max_behaviours: int = MAX_BEHAVIOURS,
+    strict_bml: bool = False,
+) -> list[Block]:
+    """Return the blocks of a text with one or more documents, in order.
+
+    Arguments and errors are those of `parse`; the first document that cannot be read raises its error. `read`
+    goes on after it.
+    """
     if not isinstance(text, str | bytes):
         raise TypeError(f"text: wanted str or bytes, got {type(text).__name__}")
-    results = read(
+    blocks: list[Block] = []
+    for found in read(
         text, vocabulary, max_bytes=max_bytes, max_behaviours=max_behaviours, strict_bml=strict_bml
-    )
-    found = list(islice(results, 2))
-    if not found:
+    ):
+        if isinstance(found, BMLError):
+            raise found
+        if strict and found.problems:
+            problem = found.problems[0]
+            raise BMLError(problem.text, line=problem.line, path=problem.path, block=found.id)
+        blocks.append(found)
+    if not blocks:
         raise BMLSyntaxError("wanted a <bml> document, got an empty text")
-    if isinstance(found[0], BMLError):
-        raise found[0]
-    if len(found) > 1:
-        raise BMLError("wanted one document, got several")
-    block = found[0]
-    if strict and block.problems:
-        problem = block.problems[0]
-        raise BMLError(problem.text, line=problem.line, path=problem.path, block=block.id)
-    return block
+    return blocks
 
 
 def read(
@@ -129,7 +155,9 @@ def read(
                 yield error
         return
     try:
-        text = _decoded(text) if isinstance(text, bytes) else text
+        if isinstance(text, bytes):
+            text, note = decode(text, strict=strict_bml)
+            reader.notes = (note,) if note else ()
         text = text if strict_bml else without_doctype(text)
         spans = list(document_spans(text))
     except BMLError as error:
@@ -194,7 +222,7 @@ def _parse_at_once(
             data = text.encode()
         except UnicodeEncodeError:
             return b"", "", []
-    elif _ENCODING.match(text.removeprefix(codecs.BOM_UTF8).lstrip()):
+    elif is_declared(text):
         return b"", "", []
     else:
         data = text
@@ -236,6 +264,7 @@ class _Reader:
     strict_bml: bool
     block_ids: Iterator[str]
     wrapper: str = ""  # local name of the element around the documents
+    notes: tuple[str, ...] = ()  # about the whole text, for the first document
 
     def read(
         self,
@@ -314,12 +343,16 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
     id = (match[1] or match[2]) if match else None
     if span.fault:
         raise BMLSyntaxError(span.fault, line=line, block=id)
-    data = _encoded(text[span.start : span.end], line, id)
+    document = text[span.start : span.end]
+    if not reader.strict_bml and _WORDS.search(document):
+        document, note = without_controls(document)
+        reader.notes = (*reader.notes, note) if note else reader.notes
+    data = _encoded(document, line, id)
     if len(data) > max_bytes:
         raise BMLSizeError(
             f"wanted at most {max_bytes} bytes in a document, got {len(data)}", line=line, block=id
         )
-    notes: tuple[str, ...] = ()
+    notes, reader.notes = reader.notes, ()
     try:
         root = element(data, lines_before=line - 1, block=id)
     except BMLSyntaxError:
@@ -327,7 +360,7 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
         if found is None:
             raise
         root, note = found
-        notes = (note,) if note else ()
+        notes = (*notes, note) if note else notes
     return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
 
 
@@ -376,27 +409,3 @@ def _encoded(document: str, line: int, block: str | None) -> bytes:
         line += document.count("\n", 0, error.start)
         text = f"wanted characters XML can hold, got U+{ord(document[error.start]):04X}"
         raise BMLSyntaxError(text, line=line, block=block) from None
-
-
-def encoding_of(data: bytes) -> str:
-    """Return the encoding of a text by BOM or declaration; UTF-8 by default."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "utf-16"
-    match = _ENCODING.match(data.removeprefix(codecs.BOM_UTF8).lstrip())
-    return match[1].decode() if match else "utf-8"
-
-
-def _decoded(data: bytes) -> str:
-    """Decode bytes by BOM, declaration, or as UTF-8."""
-    encoding = encoding_of(data)
-    try:
-        if codecs.lookup(encoding).name not in _CODECS:
-            raise LookupError(encoding)
-        return data.decode(encoding)
-    except LookupError:
-        raise BMLSyntaxError(f"encoding: wanted UTF-8, UTF-16 or Latin, got {quoted(encoding)}") from None
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise BMLSyntaxError(
-            f"wanted {encoding}, got the byte 0x{data[error.start]:02X}", line=line
-        ) from None

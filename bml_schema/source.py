@@ -9,7 +9,8 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bml_schema.documents import encoding_of
+from bml_schema.encodings import decode
+from bml_schema.errors import BMLError
 from bml_schema.tolerant_scanner import DOCUMENT, Element, ScanError, scan
 
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
@@ -211,8 +212,8 @@ class Source:
 
 
 def _decoded(data: bytes) -> str:
-    """Decode bytes by BOM, declaration or as UTF-8; undecodable bytes become U+FFFD."""
+    """Decode bytes as the parser does; undecodable bytes become U+FFFD."""
     try:
-        return data.decode(encoding_of(data), "replace")
-    except LookupError:
+        return decode(data)[0]
+    except BMLError:
         return data.decode("utf-8", "replace")

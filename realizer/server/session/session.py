@@ -11,7 +11,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from bml_schema import WarningFeedback
+from bml_schema import BMLError, WarningFeedback
+from bml_schema.encodings import decode
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError
@@ -20,6 +21,7 @@ from realizer.playback.player import Player
 from realizer.protocol.messages.parse import parse_control
 from realizer.protocol.messages.replies import ErrorMessage
 from realizer.protocol.messages.requests import Control
+from realizer.protocol.streams import KINDS as FRAMES
 from realizer.server.documents.document_queue import Submission, block_id_of
 from realizer.server.documents.limits import duration_error
 from realizer.server.journal import TakenOver
@@ -171,6 +173,7 @@ class Session:
         """Handle a message: a picture or sound in bytes, a control message that starts with `{`, or BML."""
         if self.closed or connection not in self.connections:
             return
+        message = _as_text(message) if isinstance(message, bytes) else message
         t = self.clock.read(now)
         self.due.send_before_change(t)
         if self.journal.needs_checkpoint and not self.journal.compact(t):
@@ -296,3 +299,16 @@ class Session:
         if self.journal.needs_checkpoint and not self.closed:
             self.due.publish(t := self.clock.read(now))
             self.journal.compact(t)
+
+
+_BLANKS = b"\xef\xbb\xbf\xff\xfe\0 \t\r\n"  # of a text in UTF-8 or UTF-16
+
+
+def _as_text(message: bytes) -> str | bytes:
+    """Return the text of a binary message that begins as BML or a control message does, not as a frame."""
+    if not message or message[0] in FRAMES or message.lstrip(_BLANKS)[:1] not in (b"<", b"{"):
+        return message
+    try:
+        return decode(message)[0]
+    except BMLError:
+        return message.decode("utf-8", "replace")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +24,14 @@ POINTS = ["start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end"
 
 def warnings(client):
     return [f for f in client.feedback if isinstance(f, WarningFeedback)]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_session_reads_bml_and_control_messages_in_binary_messages(driver: Driver, encoding: str) -> None:
+    client = driver.send(NOD.format("b").encode(encoding))
+    assert [f.id for f in client.feedback if isinstance(f, BlockProgress)][:1] == ["b:start"]
+    client = driver.send(json.dumps({"type": "ping"}).encode(encoding))
+    assert client.of("pong")
 
 
 # feedback ---------------------------------------------------------------------------------------
