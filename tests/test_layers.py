@@ -95,6 +95,7 @@ IMPORTERS = {
     "pocketsphinx": ("realizer.speech.align.sphinx",),
     "starlette": ("realizer.server.http",),
     "uvicorn": ("realizer.server.http",),
+    "prometheus_client": ("realizer.server.http.metrics",),
     "h11": ("realizer.server.http.protocols",),
     "stomp": ("realizer.server.transports.broker",),
     "jwt": ("realizer.server.http.access",),

@@ -1,10 +1,13 @@
-"""Metrics in the Prometheus text format (0.0.4)."""
+"""Metrics in the Prometheus text format (0.0.4), and their sum over workers."""
 
 import logging
-import re
-from bisect import bisect_left
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from prometheus_client import Histogram, Metric, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+from prometheus_client.parser import text_string_to_metric_families
 
 log = logging.getLogger(__name__)
 
@@ -15,48 +18,31 @@ PLANNING = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 SLOW_STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0)
 
 
-class Histogram:
-    """A histogram of seconds."""
-
-    def __init__(self, ends: Sequence[float]) -> None:
-        self.pending: list[float] = []  # seconds that `count` will add to the buckets
-        self._ends = ends
-        self._counts = [0] * (len(ends) + 1)
-        self._sum = 0.0
-
-    def count(self) -> None:
-        """Add the pending seconds to the buckets."""
-        for seconds in self.pending:
-            self._counts[bisect_left(self._ends, seconds)] += 1
-        self._sum += sum(self.pending)
-        self.pending.clear()
-
-    def lines(self, name: str, labels: str) -> Iterable[str]:
-        """Yield the samples; `labels` without the braces, or ""."""
-        self.count()
-        count = 0
-        for end, n in zip((*(f"{end:g}" for end in self._ends), "+Inf"), self._counts, strict=True):
-            count += n
-            bucket_labels = ",".join(filter(None, (labels, f'le="{end}"')))
-            yield f"{name}_bucket{{{bucket_labels}}} {count}"
-        braces = f"{{{labels}}}" if labels else ""
-        yield f"{name}_sum{braces} {_number(self._sum)}"
-        yield f"{name}_count{braces} {count}"
-
-
 class Metrics:
-    """The counters of one process.
+    """The metrics of one process; of no registry of the library, because a process may have several services.
 
     Attributes:
+        counts: name in `COUNTERS` -> its count.
+        late: seconds by which sessions woke too late to send frames.
         slow_steps: seconds of the steps of the event loop that delayed all clients.
     """
 
     def __init__(self, worker: int | None = None) -> None:
-        self.late = Histogram(LATENESS)  # seconds by which sessions woke too late to send frames
-        self.planning = Histogram(PLANNING)
-        self.slow_steps = Histogram(SLOW_STEPS)
+        self._labels = {} if worker is None else {"worker": str(worker)}
         self.counts: Counter[str] = Counter(dict.fromkeys(COUNTERS, 0))
-        self._labels = "" if worker is None else f'worker="{worker}"'
+        self._histograms: list[Histogram] = []
+        self.late = self._histogram("lateness", "By how much a session was woken too late.", LATENESS)
+        self.planning = self._histogram("planning", "How long it took to read and plan a document.", PLANNING)
+        self.slow_steps = self._histogram(
+            "slow_step", "Steps of the event loop of 0.05 s or more.", SLOW_STEPS
+        )
+
+    def _histogram(self, name: str, description: str, ends: Sequence[float]) -> Histogram:
+        made = Histogram(
+            f"realizer_{name}_seconds", description, list(self._labels), buckets=ends, registry=None
+        )
+        self._histograms.append(made)
+        return made.labels(**self._labels) if self._labels else made
 
     def report_slow_step(self, seconds: float, action: str, session: str, connections: Sequence[int]) -> None:
         """Count and log a step of the event loop that took long.
@@ -64,7 +50,7 @@ class Metrics:
         Args:
             action: what it did, and for which session and connections.
         """
-        self.slow_steps.pending.append(seconds)
+        self.slow_steps.observe(seconds)
         fields = {
             "session": session,
             "connections": connections,
@@ -84,29 +70,21 @@ class Metrics:
             now: name in `GAUGES` -> its present value.
             more: name in `COUNTERS` -> a count to add, of sessions that still run.
         """
-        counts = {name: self.counts[name] + more.get(name, 0) for name in COUNTERS}
-        lines: list[str] = []
-        braces = f"{{{self._labels}}}" if self._labels else ""
-        for kind, names, values in (("gauge", GAUGES, now), ("counter", COUNTERS, counts)):
-            for name, description in names.items():
-                full = f"realizer_{name}" + ("_total" if kind == "counter" else "")
-                lines += [
-                    f"# HELP {full} {description}",
-                    f"# TYPE {full} {kind}",
-                    f"{full}{braces} {_number(values[name])}",
-                ]
-        for name, description, histogram in (
-            ("realizer_lateness_seconds", "By how much a session was woken too late.", self.late),
-            ("realizer_planning_seconds", "How long it took to read and plan a document.", self.planning),
-            ("realizer_slow_step_seconds", "Steps of the event loop of 0.05 s or more.", self.slow_steps),
-        ):
-            lines += [f"# HELP {name} {description}", f"# TYPE {name} histogram"]
-            lines += histogram.lines(name, self._labels)
-        return "\n".join(lines) + "\n"
-
-
-_SAMPLE = re.compile(r"(\w+)(?:\{([^}]*)\})? (\S+)")
-_WORKER = re.compile(r'worker="[^"]*",?')
+        labels, values = list(self._labels), list(self._labels.values())
+        families: list[Metric] = []
+        for name, description in GAUGES.items():
+            gauge = GaugeMetricFamily(f"realizer_{name}", description, labels=labels)
+            gauge.add_metric(values, now[name])
+            families.append(gauge)
+        for name, description in COUNTERS.items():
+            counter = CounterMetricFamily(f"realizer_{name}", description, labels=labels)
+            counter.add_metric(values, self.counts[name] + more.get(name, 0))
+            families.append(counter)
+        for histogram in self._histograms:
+            for family in histogram.collect():
+                family.samples = [s for s in family.samples if not s.name.endswith("_created")]
+                families.append(family)
+        return _text(families)
 
 
 def sum_samples(texts: Mapping[int, str]) -> str:
@@ -115,28 +93,35 @@ def sum_samples(texts: Mapping[int, str]) -> str:
     Args:
         texts: number of a worker -> its text. The samples of `realizer_worker_sessions` list the workers.
     """
-    sums: dict[str, float | None] = {}  # a comment -> None, or the name and labels of a sample -> its sum
-    sessions: dict[int, float] = {}
+    families: dict[str, Metric] = {}
+    sums: dict[tuple[str, str, tuple[tuple[str, str], ...]], float] = {}  # by family, sample and labels
+    workers = GaugeMetricFamily(
+        "realizer_worker_sessions", "Sessions of each worker that has answered.", labels=["worker"]
+    )
     for number, text in texts.items():
-        for line in text.splitlines():
-            if (sample := _SAMPLE.fullmatch(line)) is None:
-                sums.setdefault(line)
-                continue
-            name, labels, value = sample[1], _WORKER.sub("", sample[2] or ""), float(sample[3])
-            key = f"{name}{{{labels}}}" if labels else name
-            sums[key] = (sums.get(key) or 0.0) + value
-            if key == "realizer_sessions":
-                sessions[number] = value
-    lines = [key if value is None else f"{key} {_number(value)}" for key, value in sums.items()]
-    lines += ["# HELP realizer_worker_sessions Sessions of each worker that has answered."]
-    lines += ["# TYPE realizer_worker_sessions gauge"]
-    lines += [f'realizer_worker_sessions{{worker="{n}"}} {_number(value)}' for n, value in sessions.items()]
-    return "\n".join(lines) + "\n"
+        for family in text_string_to_metric_families(text):
+            families.setdefault(family.name, Metric(family.name, family.documentation, family.type))
+            for sample in family.samples:
+                labels = tuple(item for item in sample.labels.items() if item[0] != "worker")
+                key = family.name, sample.name, labels
+                sums[key] = sums.get(key, 0.0) + sample.value
+                if sample.name == "realizer_sessions":
+                    workers.add_metric([str(number)], sample.value)
+    for (of, name, labels), value in sums.items():
+        families[of].add_sample(name, dict(labels), value)
+    return _text([*families.values(), workers])
 
 
-def _number(value: float) -> str:
-    """Format a number: integers exactly, other numbers with nine digits."""
-    return str(int(value)) if value == int(value) else f"{value:.9g}"
+@dataclass(frozen=True)
+class _Collected:
+    families: Iterable[Metric]
+
+    def collect(self) -> Iterable[Metric]:
+        return self.families
+
+
+def _text(families: Iterable[Metric]) -> str:
+    return generate_latest(_Collected(families)).decode()
 
 
 GAUGES = {

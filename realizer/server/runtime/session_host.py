@@ -231,8 +231,6 @@ class SessionHost(SessionRunner):
         blocks = [p.block for session in sessions for p in session.player.blocks.all()]
         blocks += [p.block for session in sessions for p in session.submission.pending.blocks]
         self._gc_policy.collect_if_needed(len(self._clients), sum(len(block.behaviours) for block in blocks))
-        for histogram in (self.metrics.late, self.metrics.planning, self.metrics.slow_steps):
-            histogram.count()
         now = self._loop.time()
         self._overload.end_if_over(now)
         self._registry.remove_expired(now)

@@ -232,7 +232,7 @@ class SessionRunner:
     def _wake(self, session: Session, when: float) -> None:
         """Send the frames and the feedback of a session that are due, and do what else is."""
         now = self._loop.time()
-        self.metrics.late.pending.append(now - when)
+        self.metrics.late.observe(now - when)
         self._overload.note(now - when, now)
         if not self._calls.is_busy(session):  # else it is woken again when its call has ended
             self._calls.call(session, partial(self._send_due, session, now), FRAME_SLICES)
@@ -267,7 +267,7 @@ class SessionRunner:
         plans = session.player.version
         self._work(session, now, read_documents=True)
         if session.player.version != plans:
-            self.metrics.planning.pending.append(self._loop.time() - now)
+            self.metrics.planning.observe(self._loop.time() - now)
 
     def _work(self, session: Session, now: float, *, read_documents: bool) -> None:
         self._update_backlog(session, *session.connections)

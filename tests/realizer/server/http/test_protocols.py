@@ -118,7 +118,7 @@ def flooded(flood: bytes, **settings: Any) -> dict[str, float]:
             async with connect(f"{server.url}?token=a-word") as neighbour:
                 await neighbour.send(json.dumps({"type": "ping", "id": "x"}))
                 assert json.loads(await neighbour.recv())["id"] == "x"
-            while "rate_exceeded_total 0" in (text := server._sessions.metrics_text()):
+            while "rate_exceeded_total 0.0" in (text := server._sessions.metrics_text()):
                 await asyncio.sleep(0)
             writer.transport.abort()
         return {name: float(value) for name, value in re.findall(r"^realizer_(\w+) (\S+)$", text, re.M)}
@@ -166,8 +166,8 @@ def test_protocol_counts_errors_of_requests() -> None:
                 assert status in await reader.readline()
                 writer.close()
             text = server._sessions.metrics_text()
-        assert "realizer_http_errors_total 3\n" in text
-        assert "realizer_http_failures_total 0\n" in text
+        assert "realizer_http_errors_total 3.0\n" in text
+        assert "realizer_http_failures_total 0.0\n" in text
 
     asyncio.run(run())
 

@@ -426,7 +426,7 @@ def test_watch_of_a_document_whose_replay_is_killed_twice_puts_it_aside(where: s
                     assert seq_numbers(told + rest) == list(range(1, len(told + rest) + 1))
                 page = url.replace("ws://", "http://").removesuffix("/ws")
                 with urllib.request.urlopen(f"{page}/metrics") as answer:
-                    assert "realizer_quarantined_total 1\n" in answer.read().decode()
+                    assert "realizer_quarantined_total 1.0\n" in answer.read().decode()
             with serving("--journal", where) as (url, _):  # it stays aside
                 async with connect(f"{url}?session=s&seen={len(told)}") as client:
                     assert await read_feedback(client, "after:end") == rest

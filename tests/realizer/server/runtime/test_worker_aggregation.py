@@ -74,7 +74,7 @@ def test_aggregate_passes_the_request_to_each_worker() -> None:
     assert head.startswith(b"HTTP/1.1 200 OK\r\n")
     assert b"nosniff" in head
     assert b"Content-Length: %d\r\n" % len(body) in head
-    assert b"\nrealizer_sessions 3\n" in body
+    assert b"\nrealizer_sessions 3.0\n" in body
 
 
 def test_aggregate_returns_the_refusal_of_a_worker() -> None:
@@ -85,7 +85,7 @@ def test_aggregate_returns_the_refusal_of_a_worker() -> None:
 def test_aggregate_leaves_out_silent_workers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PATIENCE", 0.2)
     got, _ = asked(of(0), None)
-    assert b'realizer_worker_sessions{worker="0"} 1\n' in got
+    assert b'realizer_worker_sessions{worker="0"} 1.0\n' in got
     assert b'worker="1"' not in got
     assert asked(b"")[0].startswith(b"HTTP/1.1 503 ")
 

@@ -175,7 +175,7 @@ def test_workers_show_the_sum_of_all_metrics(workers: Workers) -> None:
         for number in (0, 1):
             mine = each[number][f'realizer_sessions{{worker="{number}"}}']
             assert whole[f'realizer_worker_sessions{{worker="{number}"}}'] == mine >= 1
-        planned = [each[k][f'realizer_planning_seconds_bucket{{worker="{k}",le="+Inf"}}'] for k in (0, 1)]
+        planned = [each[k][f'realizer_planning_seconds_bucket{{le="+Inf",worker="{k}"}}'] for k in (0, 1)]
         assert whole['realizer_planning_seconds_bucket{le="+Inf"}'] >= sum(planned) >= 3
         assert (
             whole["realizer_planning_seconds_count"] == whole['realizer_planning_seconds_bucket{le="+Inf"}']

@@ -367,12 +367,12 @@ def test_admission_metrics_count_what_happened() -> None:
             while 'id="b:end"' not in str(await socket.recv()):
                 pass
             text = await read(f"{server.page}metrics")
-        values = dict(re.findall(r"^realizer_(\S+) (\S+)$", text, re.M))
-        assert (values["sessions"], values["connections"], values["messages_total"]) == ("1", "1", "1")
-        assert values["blocks_playing"] == values["refused_total"] == values["failures_total"] == "0"
-        assert int(values["planning_seconds_count"]) >= 1
-        assert int(values["lateness_seconds_count"]) >= 2
-        assert 2**20 < int(values["memory_bytes"]) < 2**40
+        values = {name: float(n) for name, n in re.findall(r"^realizer_(\S+) (\S+)$", text, re.M)}
+        assert values["sessions"] == values["connections"] == values["messages_total"] == 1
+        assert values["blocks_playing"] == values["refused_total"] == values["failures_total"] == 0
+        assert values["planning_seconds_count"] >= 1
+        assert values["lateness_seconds_count"] >= 2
+        assert 2**20 < values["memory_bytes"] < 2**40
 
     serving(test)
 
