@@ -35,6 +35,8 @@ class BlockProgress:
     status: str | None = None  # BMLA's state of the block: IN_EXEC, DONE, INTERRUPTED, REVOKED; or None
     # If speech of the block was cut off, the words that were spoken completely; "" for none.
     said: str | None = None
+    # False if something was asked for, and nothing of the block was heard or moved the face.
+    shown: bool = True
     seq: int | None = field(default=None, compare=False)
     posix_time: int | None = field(default=None, compare=False)  # milliseconds since 1970, as read, or None
 
@@ -47,6 +49,7 @@ class BlockProgress:
         """Return the element as XML text; for `seq` and `epoch` see the module."""
         posix = _posix("bmla:posixTime", self.global_time, epoch, self.posix_time)
         said = _optional("realizer:said", self.said) + _optional("realizer:lastWord", self.last_word)
+        said += "" if self.shown else ' realizer:shown="false"'
         return (
             f'<blockProgress{_CORE} id="{sanitized_value(self.id)}" globalTime="{_seconds(self.global_time)}"'
             f"{_optional('characterId', self.character_id)}"
@@ -206,6 +209,7 @@ def parse_feedback(text: str, vocabulary: Mapping[str, type[Behaviour]] = VOCABU
             global_time=_time(root, "globalTime"),
             status=root.get(bmla("status")),
             said=root.get(own("said")),
+            shown=root.get(own("shown")) != "false",
             posix_time=_milliseconds(root),
             **common,
         )

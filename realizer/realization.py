@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from bml_schema import VOCABULARY, Feedback, Wait, WarningFeedback
+from bml_schema import Feedback, WarningFeedback
 from realizer.animation.axis import AU_NAMES
 from realizer.animation.fap.conversion import FapMapping, standard
 from realizer.animation.frames import AUFrames, FAPFrames
@@ -265,26 +265,11 @@ def realization_of(
         deformer=options.deformer,
         mapping=mapping,
         blocks=player.blocks,
-        plays_nothing=bool(refused or any(s.dropped or s.failed for s in schedules) or _wants(player))
-        and not _plays(player),
+        plays_nothing=bool(
+            refused or any(s.failed for s in schedules) or any(b.wants for b in player.blocks.all())
+        )
+        and not any(block.plays for block in player.blocks.all()),
     )
-
-
-def _wants(player: Player) -> bool:
-    """Return whether a block has behaviours that are more than times and commands."""
-    nodes = (node for active in player.blocks.all() for node in active.block.behaviours)
-    return any(player.kinds[node.tag].command is None and not isinstance(node, Wait) for node in nodes)
-
-
-def _plays(player: Player) -> bool:
-    """Return whether anything is heard or moves the face, beside idle motion; plug-ins may do more."""
-    blocks = player.blocks.all()
-    if any(active.shifts or any(active.channels.values()) for active in blocks):
-        return True
-    if any(node.tag not in VOCABULARY for active in blocks for node in active.block.behaviours):
-        return True
-    sounds = (speaking.utterance.pcm for speaking in player.speech())
-    return any(pcm is not None and pcm.any() for pcm in sounds)
 
 
 def frame_times(duration: float, fps: float) -> list[Float64]:

@@ -190,7 +190,8 @@ class BlockManager:
             case Phase.END:
                 playing.change_state(BlockEvent.END)
                 self.blocks.end(playing)
-                self.reports.add(progress(block, "end", time, playing.state, playing.words_spoken(time)))
+                said, shown = playing.words_spoken(time), playing.plays or not playing.wants
+                self.reports.add(progress(block, "end", time, playing.state, said, shown=shown))
 
     def _act(self, playing: ActiveBlock, behaviour: str, act: BlockCommand, now: float) -> None:
         try:

@@ -88,7 +88,9 @@ def prediction(
     return PredictionFeedback(character_id=block.character_id, blocks=(times,), behaviours=tuple(nodes))
 
 
-def progress(block: Block, point: str, time: float, state: State, said: str | None = None) -> BlockProgress:
+def progress(
+    block: Block, point: str, time: float, state: State, said: str | None = None, *, shown: bool = True
+) -> BlockProgress:
     """Return the progress of a block that started or ended; `said` if its speech was cut off."""
     return BlockProgress(
         id=f"{block.id}:{point}",
@@ -96,6 +98,7 @@ def progress(block: Block, point: str, time: float, state: State, said: str | No
         character_id=block.character_id,
         status=state.value,
         said=said,
+        shown=shown,
     )
 
 

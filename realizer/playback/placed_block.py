@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from bml_schema import Block, Speech, SyncRef
+from bml_schema import VOCABULARY, Block, Speech, SyncRef, Wait
 from realizer.animation.channel import Channel, Gain, Layer, later
 from realizer.animation.curves import crossfade
 from realizer.animation.idle.prosody import KnownMotion
@@ -59,6 +59,23 @@ class PlacedBlock:
     def start(self) -> float:
         """When it starts or started, seconds on the session clock; inf while unknown."""
         return self.schedule.start
+
+    @property
+    def wants(self) -> bool:
+        """Whether it asks for more than times and commands, or has lost something that did."""
+        nodes = self.block.behaviours
+        shown = any(self.kinds[n.tag].command is None and not isinstance(n, Wait) for n in nodes)
+        return shown or bool(self.first_schedule.dropped or self.schedule.dropped)
+
+    @property
+    def plays(self) -> bool:
+        """Whether anything of it is heard or moves the face, beside idle motion; plug-ins may do more."""
+        if self.shifts or any(self.channels.values()):
+            return True
+        if any(node.tag not in VOCABULARY for node in self.block.behaviours):
+            return True
+        sounds = (speaking.utterance.pcm for speaking in self.speech.values())
+        return any(pcm is not None and pcm.any() for pcm in sounds)
 
     def apply_plan(self, plan: Plan, start: float, now: float) -> None:
         """Place a plan on the session clock at `now`, with its channels, base states and speech."""

@@ -287,3 +287,10 @@ def test_to_xml_writes_times_to_the_microsecond(time: float) -> None:
 def test_parse_feedback_refuses_bytes() -> None:
     with pytest.raises(TypeError, match="text: wanted a string, got bytes"):
         parse_feedback(b"<blockProgress/>")  # type: ignore[arg-type]
+
+
+def test_block_progress_says_that_nothing_was_shown() -> None:
+    message = BlockProgress(id="b:end", global_time=1.0, status="DONE", shown=False)
+    assert 'realizer:shown="false"' in message.to_xml()
+    assert parse_feedback(message.to_xml()) == message
+    assert "shown" not in BlockProgress(id="b:end", global_time=1.0).to_xml()

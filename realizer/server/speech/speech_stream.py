@@ -40,6 +40,7 @@ class SpeechStream:
     is_closed: bool = False
     is_finished: bool = False  # whether the speech was cut off
     last_end: float = 0.0
+    shown: bool = False  # whether anything of it was heard or moved the face
     end: float = 0.0
 
     # from the client ------------------------------------------------------------------------------

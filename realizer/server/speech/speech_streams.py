@@ -218,6 +218,7 @@ class SpeechStreams:
             return feedback, frozenset()
         if block != speech.id:
             speech.words[block] = self._words(block, feedback.global_time)
+            speech.shown = speech.shown or feedback.shown
             speech.on_done(block)
             speech.last_end = max(speech.last_end, feedback.global_time)
             return feedback, frozenset()
@@ -226,7 +227,7 @@ class SpeechStreams:
         if speech.is_closed or not speech.is_finished:
             self._forget(speech.id)
         if not speech.is_finished:
-            return feedback, chunks
+            return replace(feedback, shown=speech.shown or not speech.words), chunks
         speech.words |= {chunk: self._words(chunk, feedback.global_time) for chunk in speech.scheduled}
         return replace(feedback, said=" ".join(chain.from_iterable(speech.words.values()))), chunks
 

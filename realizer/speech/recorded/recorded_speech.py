@@ -24,6 +24,7 @@ SLACK = 0.1
 SOUNDS = "phonemes or visemes"
 OVERLAP = {"words": 0.1, SOUNDS: 0.03}
 MILLISECONDS = 10  # lengths of the sound after which a time is probably in another unit
+WORD = "word-"  # before the number of a word, from 1 on
 STEP = 0.02  # s between the instants at which sounds are compared
 CACHED = 8  # recordings; a document is planned more than once before it plays
 
@@ -70,10 +71,16 @@ def _placed(request: SpeechRequest, recording: Recording) -> Utterance:
             start, end = np.interp((part.start, part.end - EDGE), was, now).tolist()
             return replace(part, start=start, end=end)
 
+        marks = {**_word_marks(words), **marks}
         words = words or tuple(map(moved, reference.words))
         phonemes = phonemes or tuple(map(moved, reference.phonemes))
         return _utterance(recording, words, phonemes, marks)
-    return _utterance(recording, words, phonemes or _by_sound(recording), {})
+    return _utterance(recording, words, phonemes or _by_sound(recording), _word_marks(words))
+
+
+def _word_marks(words: Sequence[Word]) -> dict[str, float]:
+    """Return the marks `word-1`, `word-2` ... at the known words of a recording, so that each is reported."""
+    return {f"{WORD}{number}": word.start for number, word in enumerate(words, 1)}
 
 
 def _utterance(
@@ -102,11 +109,24 @@ def _utterance(
 def _checked(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Return a recording with the words and phonemes that can be used, and what is wrong with the others."""
     duration = len(recording.pcm) / recording.rate
-    words, wrong = _usable("words", recording.words, duration)
-    phonemes, more = _usable(SOUNDS, recording.phonemes, duration)
+    given, unit = _in_seconds("words", recording.words, duration)
+    words, wrong = _usable("words", given, duration)
+    heard, other = _in_seconds(SOUNDS, recording.phonemes, duration)
+    phonemes, more = _usable(SOUNDS, heard, duration)
     if (words, phonemes) != (recording.words, recording.phonemes):
         recording = replace(recording, words=words, phonemes=phonemes)
-    return recording, (*recording.warnings, *wrong, *more)
+    return recording, (*recording.warnings, *unit, *wrong, *other, *more)
+
+
+def _in_seconds(
+    kind: str, given: tuple[Timed, ...], duration: float
+) -> tuple[tuple[Timed, ...], tuple[str, ...]]:
+    """Return items in seconds, and a sentence if they were in milliseconds: then they are far outside."""
+    last = max((item.start for item in given), default=0.0)
+    if not MILLISECONDS * duration < last <= 1000 * (duration + SLACK):
+        return given, ()
+    text = f"wanted {kind} in seconds within {duration:.2f} s, got one at {last:g}: taken as milliseconds"
+    return tuple(replace(i, start=i.start / 1000, end=i.end / 1000) for i in given), (text,)
 
 
 def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple[Timed, ...], list[str]]:
@@ -119,10 +139,9 @@ def _usable(kind: str, given: tuple[Timed, ...], duration: float) -> tuple[tuple
     faults: list[str] = []
     if late:
         item, text = late[0]
-        unit = ": milliseconds?" if item.start > MILLISECONDS * duration else ""
         faults.append(
             f"wanted {kind} that begin within the {duration:.2f} s of the sound, got {text!r} at "
-            f"{item.start:.2f} s{_more(late)}{unit}"
+            f"{item.start:.2f} s{_more(late)}"
         )
     if turned:
         item, text = turned[0]

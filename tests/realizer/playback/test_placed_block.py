@@ -15,6 +15,7 @@ from realizer.playback.placed_block import PlacedBlock
 from realizer.playback.scheduled_speech import SPEECH_FADE
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
+from tests.rows import each_row
 
 FACE = '<faceLexeme id="s" lexeme="SMILE" start="0" attackPeak="0.5" relax="2" end="3"/>'
 
@@ -38,6 +39,21 @@ def test_apply_plan_at_another_start_moves_channels_claims_and_ends() -> None:
     assert (claim.begin, claim.end, made.schedule.end) == (20.0, 21.0, 22.0)
     assert {c.span[0] for c in made.moving_channels()} == {20.0}
     assert {motion.known for motion in made.known_motions()} == {12.0}
+
+
+@each_row(
+    "inside, wants, plays",
+    [
+        (FACE, True, True),
+        ('<wait id="w" duration="1"/>', False, False),
+        ('<head id="h" lexeme="NODD"/>', True, False),
+        ('<wait id="w" duration="1"/><faceLexeme id="f" lexeme="NOSUCH"/>', True, False),
+        ('<postureShift id="p"><stance type="SITTING"/></postureShift>', True, False),
+    ],
+)
+def test_plays_something_that_moves_the_face(inside: str, wants: bool, plays: bool) -> None:
+    made = placed(inside)
+    assert (made.wants, made.plays) == (wants, plays)
 
 
 def test_apply_plan_that_moves_nothing_keeps_since_when_it_is_known() -> None:

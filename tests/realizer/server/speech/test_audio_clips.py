@@ -199,6 +199,7 @@ def test_clips_are_spoken_with_their_annotated_times() -> None:
     assert not [f for f in received if isinstance(f, WarningFeedback)]
     times = {f.id: f.time for f in received if isinstance(f, SyncPointProgress)}
     assert times["b:s:m"] == pytest.approx(0.62, abs=1e-3)
+    assert (times["b:s:word-1"], times["b:s:word-2"]) == pytest.approx((0.1, 0.62), abs=1e-6)
     assert times["b:s:end"] == pytest.approx(1.0, abs=1e-6)
     packets = [unpack(m) for m in got if isinstance(m, bytes)]
     start = next(f for f in received if isinstance(f, BlockProgress)).global_time

@@ -27,7 +27,8 @@ def said(request: SpeechRequest = TEXT, **fields):
 def test_utterance_of_places_marks_by_known_words() -> None:
     utterance = said(words=WORDS)
     assert utterance.words == WORDS
-    assert utterance.marks == {"m": pytest.approx(1.0, abs=1e-3)}
+    words = {"word-1": 0.2, "word-2": 1.0, "word-3": 1.3}
+    assert utterance.marks == words | {"m": pytest.approx(1.0, abs=1e-3)}
     assert utterance.duration == 2.0
     assert utterance.pcm is SOUND
 
@@ -176,8 +177,8 @@ def test_utterance_of_warns_of_a_wrong_phoneme_and_uses_the_others(phonemes, fau
     ("phonemes", "fault"),
     [
         (
-            (Phoneme(0, 100, "m"), Phoneme(100, 200, "a"), Phoneme(200, 250, "m")),
-            LATE + "'a' at 100.00 s, and 1 more: milliseconds?",
+            (Phoneme(0, 4, "m"), Phoneme(4, 8, "a"), Phoneme(8, 9, "m")),
+            LATE + "'a' at 4.00 s, and 1 more",
         ),
         ((Phoneme(0.5, 1, "7"),), "wanted phonemes in IPA, or \"\" for a pause, got '7'"),
         (
@@ -200,10 +201,20 @@ def test_utterance_of_wrong_phonemes_uses_words_text_or_sound(phonemes, fault) -
 
 
 def test_utterance_of_wrong_words_aligns_the_text() -> None:
-    utterance = said(words=(Word(100, 500, "One"), Word(500, 900, "two")))
-    late = "wanted words that begin within the 2.00 s of the sound, got 'One' at 100.00 s, and 1 more"
-    assert utterance.warnings[:2] == (f"{late}: milliseconds?", "these words are not used")
+    utterance = said(words=(Word(4, 5, "One"), Word(5, 9, "two")))
+    late = "wanted words that begin within the 2.00 s of the sound, got 'One' at 4.00 s, and 1 more"
+    assert utterance.warnings[:2] == (late, "these words are not used")
     assert utterance.phonemes == said().phonemes
+
+
+def test_utterance_of_takes_times_far_outside_as_milliseconds() -> None:
+    in_seconds = said(words=WORDS, phonemes=PHONEMES)
+    words = tuple(Word(1000 * w.start, 1000 * w.end, w.text) for w in WORDS)
+    phonemes = tuple(Phoneme(1000 * p.start, 1000 * p.end, p.ipa) for p in PHONEMES)
+    utterance = said(words=words, phonemes=phonemes)
+    assert [(w.text, pytest.approx(w.start)) for w in WORDS] == [(w.text, w.start) for w in utterance.words]
+    assert [p.ipa for p in utterance.phonemes] == [p.ipa for p in in_seconds.phonemes]
+    assert ["taken as milliseconds" in warning for warning in utterance.warnings] == [True, True]
 
 
 def test_utterance_of_counts_a_phoneme_with_two_faults_once() -> None:
