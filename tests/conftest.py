@@ -47,12 +47,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Allow slow tests and those that draw or use a browser 300 s; `timeout` in pyproject.toml is for others.
-
-    The timeouts of Playwright come first. One that fires while a failure is reported ends the whole run.
-
-    All that draw run in one process of pytest-xdist: each would find out anew what the machine can draw with.
-    The first picture in a new checkout compiles loops, which takes most of a minute on a busy machine.
+    """Run all tests that draw in one process of pytest-xdist: each would find out anew what it can draw with.
 
     CI finds modules with slow tests by a word, so that thousands of other tests are not collected again.
     """
@@ -66,9 +61,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             )
         if item.get_closest_marker("gl") and not item.get_closest_marker("xdist_group"):
             item.add_marker(pytest.mark.xdist_group("render"))
-        patient = any(map(item.get_closest_marker, ("slow", "browser", "gl")))
-        if patient and not item.get_closest_marker("timeout"):
-            item.add_marker(pytest.mark.timeout(300))
 
 
 @pytest.fixture(autouse=True)

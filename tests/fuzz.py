@@ -57,7 +57,7 @@ __all__ = ["TARGETS", "corpus", "no_hang", "plays", "tried"]
 
 CORPUS = Path(__file__).parent / "corpus"
 # s of CPU for one try: far above the 0.1 s that is aimed at, so that a busy machine is no fault.
-HANG = 5.0
+HANG = 100.0  # s of CPU time, hundreds of times what a try takes
 LIMIT = 20_000  # bytes of an Xface task
 STEPS = 40  # of an interleaving
 # What stands in the place of a value of a control message.
@@ -65,24 +65,21 @@ VALUES = (None, True, 0, -1, 1e308, 2**70, "", "x" * 300, "\ud800", [], {}, [[]]
 
 
 class HangError(Exception):
-    """A try took more CPU time than allowed."""
+    """A try hangs."""
 
 
 @contextmanager
-def no_hang(what: object) -> Iterator[list[float]]:
-    """Interrupt code that takes too long; the list then has the CPU seconds it took."""
+def no_hang(what: object) -> Iterator[None]:
+    """Interrupt code that hangs."""
 
     def ring(*_: object) -> None:
         raise HangError(what)
 
     before = signal.signal(signal.SIGPROF, ring)
     signal.setitimer(signal.ITIMER_PROF, HANG)
-    took: list[float] = []
-    start = time.process_time()
     try:
-        yield took
+        yield
     finally:
-        took.append(time.process_time() - start)
         signal.setitimer(signal.ITIMER_PROF, 0)
         signal.signal(signal.SIGPROF, before)
 
@@ -93,23 +90,20 @@ def corpus() -> tuple[bytes, ...]:
     return tuple(path.read_bytes() for path in sorted(CORPUS.rglob("*.xml")))
 
 
-def tried(target: str, seeds: range) -> float:
-    """Try a target with each of the seeds; return the CPU seconds of the slowest.
+def tried(target: str, seeds: range) -> None:
+    """Try a target with each of the seeds.
 
     Raises:
         AssertionError: one failed; with its seed.
     """
-    slowest = 0.0
     for seed in seeds:
         sound = SOURCES.get(target)
         mutant = b"" if sound is None else next(mutants(sound(), 1, seed))
         try:
-            with no_hang(f"{target} {seed}") as took:
+            with no_hang(f"{target} {seed}"):
                 TARGETS[target](seed, mutant)
         except Exception as wrong:
             raise AssertionError(f"python -m tests.fuzz --only {target} --seed {seed}") from wrong
-        slowest = max(slowest, took[0])
-    return slowest
 
 
 def _or_words(read: Callable[[], T]) -> T | RealizerError:

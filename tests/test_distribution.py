@@ -14,6 +14,7 @@ import pytest
 import yaml
 
 from realizer import __version__
+from tests.waiting import LIMIT
 
 ROOT = Path(__file__).parent.parent
 RELEASE = ROOT / ".github" / "release.sh"
@@ -31,7 +32,7 @@ def build(source: Path, target: Path, *options: str) -> list[bytes]:
     pytest.importorskip("hatchling")
     environment = {**os.environ, "PYTHONPATH": ""}
     command = [sys.executable, "-m", "hatchling", "build", "-d", str(target), *options]
-    subprocess.run(command, cwd=source, env=environment, check=True, capture_output=True, timeout=120)
+    subprocess.run(command, cwd=source, env=environment, check=True, capture_output=True, timeout=LIMIT)
     return [(target / name).read_bytes() for name in NAMES if (target / name).is_file()]
 
 

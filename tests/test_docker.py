@@ -24,6 +24,7 @@ from websockets.asyncio.client import connect
 from realizer.cli.serve import serve
 from realizer.core.settings import Settings
 from realizer.server.http.metrics import GAUGES, Metrics
+from tests.waiting import LIMIT
 
 pytestmark = pytest.mark.xdist_group("image")
 
@@ -32,7 +33,6 @@ DOCKER = ROOT / "docker"
 DOCKERFILE = (DOCKER / "Dockerfile").read_text("utf-8")
 COMPOSE = yaml.safe_load((DOCKER / "compose.yaml").read_text("utf-8"))
 NODES = {name: service for name, service in COMPOSE["services"].items() if "build" in service}
-LIMIT = 120  # s; a hung test ends
 
 # Nothing of the system can be written but memory that processes share; root has no rights of its own.
 CONFINED = """set -e

@@ -30,8 +30,8 @@ from tests.protocol import (
     within,
 )
 from tests.rows import each_row
+from tests.waiting import LIMIT
 
-LIMIT = 30  # s
 DOCUMENT = asyncapi()
 NUMERIC = [row.name for row in STREAMS.values() if row.numeric]
 

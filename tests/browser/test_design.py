@@ -20,6 +20,7 @@ from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_file import read_timeline, write_timeline
 from tests.accessibility import serious_faults
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark, serving
+from tests.waiting import LIMIT
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
 
@@ -55,7 +56,7 @@ def address(edits: Path) -> Iterator[str]:
 def warm(url: str) -> None:
     """Get what the page will get: on a busy machine the first answer may take longer than a request may."""
     for _ in range(5):
-        with suppress(OSError, HTTPException), urllib.request.urlopen(url, timeout=60):
+        with suppress(OSError, HTTPException), urllib.request.urlopen(url, timeout=LIMIT):
             return
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from realizer.face.load import folder_of, list_faces, load_face
+from tests.waiting import LIMIT
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 pytestmark = [
@@ -26,7 +27,7 @@ pytestmark = [
     # Playwright's own event loop closes its pipes late.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
 ]
-PATIENCE = 100_000  # ms; pages that draw without a graphics card are slow
+PATIENCE = 1000 * LIMIT  # ms
 ARGUMENTS = [
     "--no-sandbox",
     "--use-angle=swiftshader",
@@ -52,7 +53,7 @@ def serving(command: list[str]) -> Iterator[str]:
     yield found.group()
     service.send_signal(signal.SIGINT)
     service.stdout.close()
-    assert service.wait(15) == 0
+    assert service.wait(LIMIT) == 0
 
 
 @pytest.fixture(scope="module")

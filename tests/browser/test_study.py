@@ -13,7 +13,7 @@ import pytest
 
 from realizer_studio.study.answers import inattentive, read_answers, read_key
 from realizer_studio.study.items import Item, checks
-from tests.browser.test_page import ARGUMENTS, CHROMIUM, browser, pytestmark
+from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark
 from tests.studies import displaced, kit, matches, named
 
 __all__ = ["ARGUMENTS", "CHROMIUM", "browser", "pytestmark"]
@@ -33,7 +33,7 @@ def page(browser, study: Path) -> Iterator[Any]:  # type: ignore[no-untyped-def]
     """The page's first screen; an error on its console fails the test."""
     context = browser.new_context(viewport={"width": 390, "height": 844}, accept_downloads=True)
     page = context.new_page()
-    page.set_default_timeout(20_000)
+    page.set_default_timeout(PATIENCE)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)

@@ -304,7 +304,7 @@ def test_sliders_set_faps_and_save_them_as_a_file(page) -> None:  # type: ignore
     clip = read_fap(Path(saved.value.path()).read_text("ascii"))
     assert clip.values[0, COLUMN["open_jaw"]] == 400
     assert clip.values[0, COLUMN["raise_b_midlip"]] == -300
-    page.wait_for_function("realizerPage.timeline.kinds.fap.at(Infinity).open_jaw === 400", timeout=10_000)
+    page.wait_for_function("realizerPage.timeline.kinds.fap.at(Infinity).open_jaw === 400")
 
 
 def test_wheel_shows_the_clicked_place_by_the_chosen_profiles(page) -> None:  # type: ignore[no-untyped-def]

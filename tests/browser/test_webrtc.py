@@ -28,12 +28,13 @@ from realizer.client import connect
 from realizer.protocol.wire import PictureFrame
 from realizer.server.http.webrtc import QUALITY
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark
+from tests.waiting import LIMIT
 
 __all__ = ["browser", "pytestmark"]
 
 Curve = np.ndarray[Any, Any]
 RATE = 24000
-SETTLING = 8000  # ms; picture and sound are brought together step by step
+SETTLING = 8  # s; picture and sound are brought together step by step
 BEEP = 0.24  # s
 ENOUGH = 8  # pictures a second
 STARTS = (0.5, 1.13, 1.71, 2.47, 3.02, 3.83, 4.36, 5.2, 5.71, 6.5, 7.03, 7.9)  # s; irregular
@@ -97,7 +98,7 @@ def application() -> Iterator[str]:
     finally:
         process.send_signal(signal.SIGINT)
         process.stdout.close()
-        process.wait(15)
+        process.wait(LIMIT)
 
 
 def beeps() -> bytes:
@@ -180,13 +181,18 @@ def watched(browser, url: str, session: str, **options: str):  # type: ignore[no
     assert faults == []
 
 
+def wait_for_pictures(page, seconds: float) -> None:  # type: ignore[no-untyped-def]
+    """Wait until the page has seen pictures of as many further seconds."""
+    page.wait_for_function("(until) => seen.at(-1)[0] > until", arg=page.evaluate("seen.at(-1)[0]") + seconds)
+
+
 def measure(browser, url: str, size: str, shot: str | None = None) -> dict[str, Any]:  # type: ignore[no-untyped-def]
     """Return pictures a second, and the offset of the lips in ms, of pictures of a size."""
     with watched(browser, url, f"m{size}", size=size) as page:
-        page.wait_for_timeout(SETTLING)
+        wait_for_pictures(page, SETTLING)
         with ThreadPoolExecutor(1) as pool:  # playwright has an event loop in this thread
             mouth, sound = pool.submit(asyncio.run, curves(url, f"m{size}", size)).result()
-        page.wait_for_timeout(1500)
+        wait_for_pictures(page, 1.5)
         seen, heard = np.array(page.evaluate("seen")), np.array(page.evaluate("heard"))
         loudest = page.evaluate("loudest")
         if shot is not None:

@@ -21,9 +21,9 @@ from bml_schema.feedback import BlockProgress, Feedback, PredictionFeedback, Syn
 from realizer.client import Client, connect
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "dialogue.py"
-LIMIT = 90  # s
 
 spec = spec_from_file_location("dialogue", PROGRAM)
 assert spec is not None

@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 
 from tests.programs import serving
+from tests.waiting import LIMIT
 
 ROOT = Path(__file__).parents[2]
 # What the client of the realizer needs beside Pipecat.
 PACKAGES = ("pipecat-ai>=1.10,<2", "websockets", "pydantic", "numpy", "lxml", "pillow")
 
-pytestmark = [pytest.mark.slow, pytest.mark.espeak, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow, pytest.mark.espeak]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def converse(python: Path) -> Iterator[Callable[..., dict[str, Any]]]:
                 env={**os.environ, "PYTHONPATH": str(ROOT)},
                 capture_output=True,
                 text=True,
-                timeout=100,
+                timeout=LIMIT,
             )
             assert done.returncode == 0, done.stderr[-2000:]
             result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])

@@ -17,12 +17,13 @@ import pytest
 from websockets.sync.client import connect
 
 import realizer
+from tests.waiting import LIMIT
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "plugin"
 WINK = '<bml id="b" xmlns:e="urn:realizer-example"><e:wink id="w" side="RIGHT" start="0" end="1"/></bml>'
 BML = WINK.replace("</bml>", '<speech id="s"><text>Hello there</text></speech></bml>')
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow]
 
 
 @pytest.fixture(scope="module")
@@ -122,4 +123,4 @@ def test_transport_takes_lines_and_sends_feedback(home: Path, workers: str) -> N
         assert "warningFeedback" not in heard
     finally:
         service.send_signal(signal.SIGTERM)
-        service.communicate(timeout=60)
+        service.communicate(timeout=LIMIT)

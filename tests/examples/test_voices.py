@@ -24,9 +24,9 @@ from realizer.client import Client, connect
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack_clip
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-LIMIT = 30  # s
 
 
 def example(name: str) -> ModuleType:

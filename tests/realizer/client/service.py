@@ -7,9 +7,9 @@ from typing import Any
 
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.1"/></bml>'
-LIMIT = 30  # s
 
 
 def serving(test, limit: float = LIMIT, **settings: Any) -> None:

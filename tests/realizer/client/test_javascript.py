@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.browser.test_page import serving
+from tests.waiting import LIMIT
 
 FOLDER = Path(__file__).parents[3] / "clients" / "javascript"
 NODE = shutil.which("node")
@@ -42,7 +43,7 @@ realizer.voice({});
 
 def run(*command: str, **environment: str) -> str:
     done = subprocess.run(
-        command, cwd=FOLDER, env={**os.environ, **environment}, capture_output=True, text=True, timeout=120
+        command, cwd=FOLDER, env={**os.environ, **environment}, capture_output=True, text=True, timeout=LIMIT
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

@@ -15,8 +15,8 @@ from realizer.client.record import _film_frames as each
 from realizer.client.record import _sound as sound_of
 from realizer.protocol.wire import WireFrame, pack, unpack
 from tests.realizer.client.service import serving
+from tests.waiting import LIMIT
 
-LIMIT = 120  # s
 FPS = 5
 SIZE = 128
 LOOK = '<faceFacs id="f{au}" au="{au}" amount="{amount}" start="0" attackPeak="0.2" relax="2.6" end="2.8"/>'

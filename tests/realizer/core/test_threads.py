@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from realizer.core.threads import SINGLE_THREAD, use_one_thread
+from tests.waiting import LIMIT
 
 
 def test_use_one_thread_keeps_what_the_environment_says(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -21,4 +22,4 @@ def test_use_one_thread_keeps_what_the_environment_says(monkeypatch: pytest.Monk
 
 def test_use_one_thread_comes_before_numpy_in_commands() -> None:
     script = "import realizer.cli, sys; assert 'numpy' not in sys.modules"
-    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=LIMIT)

@@ -12,6 +12,7 @@ import pytest
 
 from realizer.core import work
 from realizer.server.runtime.engines import FairPool
+from tests.waiting import LIMIT
 
 
 @pytest.mark.parametrize(("steps", "limit", "fits"), [(9, 10, True), (10, 10, True), (11, 10, False)])
@@ -90,8 +91,8 @@ class Blocked(FairPool):
         self.done: list[str] = []
         self.release = threading.Event()
         begun = threading.Event()
-        self.submit("first", lambda: (begun.set(), self.release.wait(60)))
-        assert begun.wait(60)
+        self.submit("first", lambda: (begun.set(), self.release.wait(LIMIT)))
+        assert begun.wait(LIMIT)
 
     def add(self, owner: str, call: str) -> Future[Any]:
         return self.submit(owner, lambda: self.done.append(call))
@@ -110,7 +111,7 @@ def test_fair_pool_serves_owners_in_turn(pool) -> None:
     calls.append(pool.add("c", "c0"))
     pool.release.set()
     for call in calls:
-        call.result(60)
+        call.result(LIMIT)
     assert pool.done == ["a0", "b0", "c0", "a1", "b1", "a2", "a3", "a4"]
 
 
@@ -122,25 +123,25 @@ def test_fair_pool_drops_the_calls_of_one_owner(pool) -> None:
     later = pool.add("a", "later")
     pool.release.set()
     for call in (*kept, later):
-        call.result(60)
+        call.result(LIMIT)
     assert pool.done == ["b0", "a2", "later"]
     for call in dropped:
         with pytest.raises(CancelledError):
-            call.result(60)
+            call.result(LIMIT)
 
 
 def test_fair_pool_returns_results_and_exceptions(pool) -> None:
     good, bad = pool.submit("a", lambda: 3), pool.submit("a", lambda: [][1])
     pool.release.set()
-    assert good.result(60) == 3
+    assert good.result(LIMIT) == 3
     with pytest.raises(IndexError):
-        bad.result(60)
-    assert pool.submit("a", lambda: 4).result(60) == 4
+        bad.result(LIMIT)
+    assert pool.submit("a", lambda: 4).result(LIMIT) == 4
 
 
 def test_fair_pool_skips_calls_that_were_cancelled(pool) -> None:
     calls = [pool.add("a", f"a{n}") for n in range(3)]
     assert calls[1].cancel()
     pool.release.set()
-    calls[2].result(60)
+    calls[2].result(LIMIT)
     assert pool.done == ["a0", "a2"]

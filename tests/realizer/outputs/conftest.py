@@ -23,6 +23,7 @@ from realizer.realization import Performance, Realization
 from realizer.render.renderer import Renderer
 from realizer.scheduling.timing import Schedule, Warning
 from realizer.speech.utterance import Phoneme, Utterance, Word
+from tests.waiting import LIMIT
 
 FPS = 25.0
 DURATION = 1.5
@@ -105,7 +106,7 @@ def read_by() -> Callable[..., Any]:
         if node is None or not (READERS / "node_modules").is_dir():
             pytest.skip(f"needs Node and: npm ci --prefix {READERS}")
         done = subprocess.run(
-            [node, READERS / script, *map(str, arguments)], capture_output=True, text=True, timeout=120
+            [node, READERS / script, *map(str, arguments)], capture_output=True, text=True, timeout=LIMIT
         )
         assert done.returncode == 0, done.stderr
         return json.loads(done.stdout)

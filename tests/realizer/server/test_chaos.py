@@ -42,8 +42,8 @@ from tests.many_clients import (
     send_simultaneously,
 )
 from tests.realizer.server.conftest import Clock
+from tests.waiting import LIMIT, wait_for
 
-LIMIT = 60  # s; a hung test ends
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
 TALK = '<bml id="{}"><speech id="s"><text>{}</text></speech></bml>'
 
@@ -334,8 +334,7 @@ def test_chaos_clock_that_jumps_does_not_disturb_rows_ahead(
 
 async def wait_for_no_connections(server: Server, files: int) -> None:
     """Wait until there are no connections, and no more open files than before."""
-    while server._sessions.health()["connections"] or open_files(os.getpid()) > files:
-        await asyncio.sleep(0.01)
+    await wait_for(lambda: not server._sessions.health()["connections"] and open_files(os.getpid()) <= files)
 
 
 @pytest.mark.slow
@@ -366,8 +365,7 @@ def test_chaos_client_that_closes_its_side_only_is_disconnected() -> None:
     async def test(server: Server) -> None:
         received = await asyncio.to_thread(send_and_half_close, server.port, "show")
         assert b"b:end" not in received
-        while server._sessions.health()["connections"]:
-            await asyncio.sleep(0.01)
+        await wait_for(lambda: not server._sessions.health()["connections"])
         async with connect(f"{server.url}?session=show&seen=0") as again:
             await until(again, 'id="b:end"')  # its document was played
 

@@ -24,6 +24,7 @@ from realizer.protocol.wire import unpack
 from realizer.server.serve import Server, serve, wait_for_signal, work
 from realizer.server.session.session import Session
 from tests.programs import SERVE, running
+from tests.waiting import LIMIT
 
 DOCUMENT = """<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="b">
   <speech id="s"><text>One <sync id="m"/>two</text></speech>
@@ -35,7 +36,6 @@ POINTS = {
     "n": ["start", "ready", "strokeStart", "stroke", "strokeEnd", "relax", "end"],
     "f": ["start", "attackPeak", "relax", "end"],
 }
-LIMIT = 30  # s; a hung test ends
 
 
 def serving(test: Callable[[Server], Awaitable[None]], loop=None, **settings) -> None:
@@ -347,7 +347,7 @@ def test_serve_ends_at_a_signal_in_every_event_loop(loop) -> None:
     async def end() -> object:
         ending = wait_for_signal(signal.SIGTERM)
         signal.raise_signal(signal.SIGTERM)
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(LIMIT):
             await ending
         return signal.getsignal(signal.SIGTERM)
 

@@ -1,7 +1,7 @@
 """A worker without speech, for the tests of processes; its requests say what it does."""
 
 import os
-import time
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ class Fake:
         self.drifts = "drifts" in arguments
         self.count = 0
         self.operations = {
-            "echo": self.echo, "sleep": self.sleep, "fail": self.fail, "die": self.die, "wait": self.wait
+            "echo": self.echo, "hang": self.hang, "fail": self.fail, "die": self.die, "wait": self.wait
         }  # fmt: skip
 
     def hello(self) -> dict[str, Any]:
@@ -33,18 +33,18 @@ class Fake:
         text = request["text"].encode()
         return {"count": self.count}, [text[:2], text[2:]]
 
-    def sleep(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
-        time.sleep(60)
+    def hang(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        signal.pause()
         return {}, []
 
     def fail(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
         raise ValueError("it cannot")
 
     def wait(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
-        """Write to a pipe after a while, during which its reader sees that the process lives."""
+        """Keep a pipe open, whose reader sees when the process ends; its number is the first line."""
         with Path(request["pipe"]).open("w") as pipe:
-            time.sleep(10)
-            pipe.write("it lives")
+            print(os.getpid(), file=pipe, flush=True)
+            signal.pause()
         return {}, []
 
     def die(self, request: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:

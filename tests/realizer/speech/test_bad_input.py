@@ -21,6 +21,7 @@ from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.hibari.voice import HibariVoice
 from realizer.speech.registry import VOICES
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
+from tests.waiting import LIMIT
 
 pytestmark = pytest.mark.xdist_group("voices")
 
@@ -191,7 +192,7 @@ def test_engines_lose_one_sound_when_a_process_is_killed(
         asking = threading.Thread(target=lambda: answers.append(studio.speak(order)))
         monkeypatch.setattr(engine_voice, "_exchange", announced)
         asking.start()
-        assert begun.wait(30)
+        assert begun.wait(LIMIT)
         os.kill(pid, signal.SIGKILL)
         asking.join()
         again = studio.speak(Speak(3, SpeechRequest("Four five six.", voice=name)))

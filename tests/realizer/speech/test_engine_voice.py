@@ -16,6 +16,7 @@ from realizer.speech import engine_voice
 from realizer.speech.engine_voice import MOST_CACHED, Engine, EngineProcess, EngineVoice, UtteranceCache
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import SpeechRequest, Utterance
+from tests.waiting import LIMIT
 
 
 class Counting(EngineVoice):
@@ -183,7 +184,7 @@ def test_engine_process_replaces_a_process_that_hangs(start: Start) -> None:
     process._limit = 0.2
     pid = process.pid
     with pytest.raises(VoiceError, match=r"did not answer within 0\.2 s"):
-        process.ask({"op": "sleep"})
+        process.ask({"op": "hang"})
     assert_gone(pid)
     process._limit = 5.0
     assert ask(process) == (1, b"hello")
@@ -211,7 +212,7 @@ def test_engine_process_can_be_closed_during_a_request(start: Start) -> None:
 
     def wait() -> None:
         try:
-            process.ask({"op": "sleep"})
+            process.ask({"op": "hang"})
         except VoiceError as error:
             errors.append(str(error))
 
@@ -220,7 +221,7 @@ def test_engine_process_can_be_closed_during_a_request(start: Start) -> None:
     while process._running is None or process._running._deadline == float("inf"):
         assert thread.is_alive()
     process.close()
-    thread.join(10)
+    thread.join(LIMIT)
     assert errors
     process.close()
     assert ask(process) == (1, b"hello")

@@ -1,7 +1,9 @@
 """The process around an engine."""
 
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ from typing import Any
 import pytest
 
 from realizer.speech.engine_voice import RUN
+from tests.waiting import LIMIT
 
 FAKE = Path(__file__).with_name("engines.py")
 
@@ -18,7 +21,10 @@ def run(*arguments: str, requests: list[dict[str, Any]] | None = None) -> tuple[
     """Return the first line and the answers (head, body) of a worker."""
     text = "".join(json.dumps(request) + "\n" for request in requests or [])
     done = subprocess.run(
-        [sys.executable, "-P", str(RUN), *arguments], input=text.encode(), stdout=subprocess.PIPE, timeout=60
+        [sys.executable, "-P", str(RUN), *arguments],
+        input=text.encode(),
+        stdout=subprocess.PIPE,
+        timeout=LIMIT,
     )
     hello, _, rest = done.stdout.partition(b"\n")
     answers = []
@@ -76,6 +82,11 @@ def test_worker_ends_its_fork_when_it_is_killed(tmp_path: Path) -> None:
         assert worker.stdin is not None
         worker.stdin.write(json.dumps({"op": "wait", "pipe": str(pipe)}).encode() + b"\n")
         worker.stdin.flush()
-        with pipe.open() as alive:  # the fork has opened it
+        with pipe.open() as open_in_fork:
+            fork = int(open_in_fork.readline())
             worker.kill()
-            assert alive.read() == ""
+            try:
+                assert open_in_fork.read() == ""  # the end of the file: the fork has ended
+            finally:
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(fork, signal.SIGKILL)

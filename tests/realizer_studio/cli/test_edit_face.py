@@ -12,6 +12,7 @@ from urllib.request import urlopen
 import pytest
 
 from tests.commands import run
+from tests.waiting import LIMIT
 
 
 def test_edit_face_of_an_unknown_face_exits_with_2() -> None:
@@ -36,5 +37,5 @@ def test_edit_face_serves_the_page_on_a_copy(tmp_path: Path) -> None:
         with urlopen(address.removesuffix("#face") + "faces/ada") as answer:
             assert answer.read(4) == b"glTF"
         service.send_signal(signal.SIGINT)
-        assert service.wait(60) == 0
+        assert service.wait(LIMIT) == 0
     assert (tmp_path / "edited" / "faces" / "ada" / "mesh.npz").is_file()

@@ -17,8 +17,8 @@ import uvicorn
 from realizer.core.settings import Settings
 from realizer.server.http.app import create_app
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
-LIMIT = 30.0  # s
 
 
 class Served:

@@ -18,8 +18,8 @@ from realizer.server.http.connections import session_of
 from realizer.server.journal import JournalError
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
-LIMIT = 30  # s
 TOKEN = "a-token-of-many-letters-and-0123456789"
 
 

@@ -19,8 +19,8 @@ from realizer.server.http import protocols
 from realizer.server.http.protocols import SLICE
 from realizer.server.http.socket_client import SocketClient
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
-LIMIT = 60  # s; a hung test ends
 
 
 def answers(*requests: bytes) -> list[bytes]:

@@ -28,9 +28,9 @@ from realizer.protocol.wire import HEADER, unpack
 from realizer.server.serve import Server
 from tests.portraits import LITERT, faps_of, portrait
 from tests.programs import SERVE, running
+from tests.waiting import LIMIT
 
 WAIT = '<bml id="{}"><wait id="w" duration="0.3"/></bml>'
-LIMIT = 60  # s; a hung test ends
 
 
 def serving(test: Callable[[Server], Awaitable[None]], **settings: Any) -> None:
@@ -316,10 +316,10 @@ def test_websocket_leaves_no_traceback_when_a_client_resets() -> None:
                     b"GET /ws HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
                     b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\nSec-WebSocket-Version: 13\r\n\r\n"
                 )
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=20) as answer:
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=LIMIT) as answer:
             assert answer.status == 200
         service.send_signal(signal.SIGTERM)
-        _, logged = service.communicate(timeout=20)
+        _, logged = service.communicate(timeout=LIMIT)
     assert not logged
 
 

@@ -21,6 +21,7 @@ from realizer.server.http.app import create_app
 from realizer.server.http.webrtc import offer_of, video_fields
 from realizer.server.runtime.session_registry import JoinError
 from tests.realizer.server.http.conftest import LIMIT, Served
+from tests.waiting import wait_for
 
 RATE = 16000
 
@@ -67,12 +68,8 @@ def refusal(app: Served, path: str, kinds: tuple[str, ...] = ("video",)) -> tupl
     return with_peer(app, path, kinds, lambda peer: asyncio.sleep(0))
 
 
-async def none_left(app: Served) -> bool:
-    for _ in range(200):
-        if await asyncio.to_thread(connections, app) == 0:
-            return True
-        await asyncio.sleep(0.05)
-    return False
+def wait_until_none_is_left(app: Served) -> None:
+    asyncio.run(wait_for(lambda: connections(app) == 0))
 
 
 def test_webrtc_sends_the_sound_of_a_session(app) -> None:
@@ -88,7 +85,7 @@ def test_webrtc_sends_the_sound_of_a_session(app) -> None:
         return heard
 
     assert with_peer(app, "/sessions/sound/webrtc", ("audio",), act) == 40
-    assert asyncio.run(none_left(app))
+    wait_until_none_is_left(app)
 
 
 @pytest.mark.gl
@@ -119,7 +116,7 @@ def test_webrtc_answers_sdp_by_sdp_and_frees_a_peer_that_is_deleted(app) -> None
         return str(sdp)
 
     sdp = asyncio.run(offered())
-    assert asyncio.run(none_left(app))  # of other tests
+    wait_until_none_is_left(app)  # of other tests
     status, headers, body = app("POST", "/sessions/w/webrtc", sdp, **{"Content-Type": "application/sdp"})
     headers = {name.lower(): value for name, value in headers.items()}
     assert (status, headers["content-type"], body[:4]) == (201, "application/sdp", b"v=0\r")
@@ -127,7 +124,7 @@ def test_webrtc_answers_sdp_by_sdp_and_frees_a_peer_that_is_deleted(app) -> None
     place = headers["location"]
     assert app.error("DELETE", place.replace("/w/", "/v/"))[0] == 404
     assert app("DELETE", place)[0] == 204
-    assert asyncio.run(none_left(app))
+    wait_until_none_is_left(app)
     assert app.error("DELETE", place)[0] == 404
 
 
@@ -144,7 +141,7 @@ def test_webrtc_answers_sdp_by_sdp_and_frees_a_peer_that_is_deleted(app) -> None
 def test_webrtc_refuses_wrong_options_and_keeps_no_connection(app, query, words) -> None:
     status, got = refusal(app, f"/sessions/s/webrtc?{query}")
     assert (status, got[: len(words)]) == (400, words)
-    assert asyncio.run(none_left(app))
+    wait_until_none_is_left(app)
 
 
 def test_webrtc_refuses_offers_that_are_none(app) -> None:
@@ -184,7 +181,7 @@ def test_webrtc_gives_up_a_peer_that_never_connects(serve, monkeypatch) -> None:
     with serve(create_app(Settings(voice="silent"))) as app:
         path = "/sessions/s/webrtc"
         assert asyncio.run(_offer_and_leave(app, path)) == 201
-        assert asyncio.run(none_left(app))
+        wait_until_none_is_left(app)
 
 
 async def _offer_and_leave(app: Served, path: str) -> int:

@@ -25,11 +25,11 @@ from websockets.exceptions import InvalidStatus
 
 from bml_schema.feedback import parse_feedback
 from tests.feedback_log import read_feedback, seq_numbers
+from tests.waiting import LIMIT
 
 CONFIGURATION = Path(__file__).parents[4] / "docker" / "haproxy.cfg"
 pytestmark = pytest.mark.xdist_group("fleet")
 
-LIMIT = 60  # s; a hung test ends
 FIRST = """<bml id="a"><head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'

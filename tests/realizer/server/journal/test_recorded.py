@@ -25,8 +25,8 @@ from realizer.server.journal.session_journal import ENTRIES
 from realizer.server.serve import Server
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
+from tests.waiting import LIMIT
 
-LIMIT = 60  # s; a hung test ends
 TALK = """<bml id="talk"><speech id="s"><text>This is cut off in the middle of what is said</text></speech>
 <faceShift id="f" start="0.2"><faceLexeme id="l" lexeme="SMILE" amount="0.5"/></faceShift>
 <head id="h" lexeme="SHAKE" start="0.1" end="3"/></bml>"""

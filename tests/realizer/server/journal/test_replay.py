@@ -31,9 +31,9 @@ from realizer.server.session.session import Session
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
 from tests.realizer.server.conftest import Clock, spoken
+from tests.waiting import LIMIT, wait_for
 from tests.worst_documents import document
 
-LIMIT = 60  # s; a hung test ends
 FIRST = """<bml id="a"><gaze id="g" target="cup" start="0.2" end="1.4"/>
 <head id="n" lexeme="NOD" start="0.6"/>
 <speech id="s" start="0.3"><text>What is said <sync id="m"/> before it dies</text></speech></bml>"""
@@ -162,8 +162,7 @@ def test_restored_session_writes_a_checkpoint_without_messages(
             for client in (one, two):
                 for _ in range(ENTRIES):
                     await client.send(SCENE)
-            while not (in_a_checkpoint(where, "one") and in_a_checkpoint(where, "two")):
-                await asyncio.sleep(0.01)
+            await wait_for(lambda: in_a_checkpoint(where, "one") and in_a_checkpoint(where, "two"))
 
     asyncio.run(run())
 
@@ -369,7 +368,6 @@ def test_restored_session_is_not_replaced_by_a_hello(where: str) -> None:
         assert asyncio.run(resume(url)) == received
 
 
-WATCH_LIMIT = 120  # s; a hung test ends
 NOD = '<bml id="{}"><head id="n" lexeme="NOD" end="0.1"/></bml>'
 SLOW = document("linked", 800, "head")  # takes about a second to plan
 
@@ -405,7 +403,7 @@ async def killed_at(where: str, note: ReplayNote) -> None:
 @pytest.mark.slow
 def test_watch_of_a_document_whose_replay_is_killed_twice_puts_it_aside(where: str) -> None:
     async def test() -> None:
-        async with asyncio.timeout(WATCH_LIMIT):
+        async with asyncio.timeout(LIMIT):
             with serving("--journal", where) as (url, service):
                 async with connect(f"{url}?session=s") as client:
                     await client.send(NOD.format("before"))

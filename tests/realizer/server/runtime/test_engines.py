@@ -14,6 +14,7 @@ from PIL import Image
 from realizer.core.errors import RenderError
 from realizer.server.runtime.engines import IDLE, Engines
 from realizer.server.session.effects import Draw, RenderOptions
+from tests.waiting import LIMIT
 
 
 @dataclass
@@ -82,10 +83,10 @@ def test_engines_keep_a_renderer_that_takes_long_to_start(
     assert width(engines.draw(order(16))) == 16
     begins = clock.asked = threading.Event()
     starting = engines.render_pool.submit(0, lambda: engines.draw(order(17)))
-    assert begins.wait(60)
+    assert begins.wait(LIMIT)
     clock.now = IDLE + 1.0
     clock.asked = None
-    assert width(starting.result(60)) == 17
+    assert width(starting.result(LIMIT)) == 17
     # The first one has waited for the second to start, for longer than an idle one may.
     assert isinstance(engines.draw(order(99)), RenderError)
     assert width(engines.draw(order(16))) == 16
@@ -96,11 +97,11 @@ def test_engines_keep_a_renderer_that_draws(engines, clock, monkeypatch: pytest.
     monkeypatch.setattr("realizer.server.runtime.engines.RENDERERS", 1)
     begins = clock.asked = threading.Event()
     drawing = engines.render_pool.submit(0, lambda: engines.draw(order(16)))
-    assert begins.wait(60)
+    assert begins.wait(LIMIT)
     clock.asked = None
     clock.now = 2 * IDLE
     assert isinstance(engines.draw(order(99)), RenderError)
-    assert width(drawing.result(60)) == 16
+    assert width(drawing.result(LIMIT)) == 16
 
 
 @pytest.mark.gl

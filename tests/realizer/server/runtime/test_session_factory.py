@@ -24,8 +24,8 @@ from realizer.server.serve import Server
 from realizer.server.session.session import Session
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.realizer.server.runtime.test_session_host import Loop, subscribed
+from tests.waiting import LIMIT
 
-LIMIT = 60  # s; a hung test ends
 NEXT = '<bml id="b" composition="APPEND"><head id="n" lexeme="SHAKE" end="0.8"/></bml>'
 
 

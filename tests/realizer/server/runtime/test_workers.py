@@ -28,11 +28,11 @@ from realizer.server.runtime.workers import Workers
 from realizer.server.serve import run_worker
 from tests.ahead import viewed
 from tests.programs import SERVE, running
+from tests.waiting import LIMIT
 
 pytestmark = pytest.mark.xdist_group("workers")
 
 T = TypeVar("T")
-LIMIT = 60  # s; a hung test ends
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 
 

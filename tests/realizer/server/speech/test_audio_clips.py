@@ -20,6 +20,7 @@ from realizer.server.serve import Server
 from realizer.server.speech import audio_clips
 from realizer.server.speech.audio_clips import AudioClips, ClipError
 from realizer.speech.sound_visemes.recogniser import recognised
+from tests.waiting import LIMIT
 
 RATE = 16000
 SOUND = np.rint(9000 * np.sin(np.arange(RATE) * 0.05)).astype("<i2")
@@ -164,7 +165,7 @@ def play(*messages, until: str = "b:end", **settings) -> list:
 
     async def run() -> None:
         async with (
-            asyncio.timeout(30),
+            asyncio.timeout(LIMIT),
             Server(Settings(port=0, voice="silent", **settings)) as server,
             connect(server.url, max_size=None) as socket,
         ):

@@ -30,6 +30,7 @@ from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import RATE, Client, Driver
+from tests.waiting import LIMIT
 
 EACH = 0.5  # s a piece
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
@@ -592,7 +593,7 @@ def streamed(test) -> list[str | bytes]:
 
     async def run() -> list[str | bytes]:
         async with (
-            asyncio.timeout(60),
+            asyncio.timeout(LIMIT),
             Server(Settings(port=0, voice="espeak")) as server,
             connect(server.url) as socket,
         ):

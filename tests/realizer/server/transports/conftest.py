@@ -13,9 +13,10 @@ from threading import Event, Thread
 
 import pytest
 
+from tests.waiting import LIMIT
+
 JARS = Path("/usr/share/activemq/lib")  # where Debian's package has them
 RABBIT = Path("/usr/lib/rabbitmq/bin/rabbitmq-server")  # the one on the PATH becomes another user
-LIMIT = 60  # s; a hung start ends
 
 CONFIGURATION = """<beans xmlns="http://www.springframework.org/schema/beans"
   xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:schemaLocation="

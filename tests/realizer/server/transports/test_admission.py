@@ -28,8 +28,8 @@ from realizer.server.http import access
 from realizer.server.http.access import Grant
 from realizer.server.runtime import session_runner
 from realizer.server.serve import Server
+from tests.waiting import LIMIT
 
-LIMIT = 60  # s; a hung test ends
 TOKEN = "Xk-secret-7"
 SECRET = "a secret that is long enough to be one"
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'

@@ -25,8 +25,8 @@ from realizer.server.runtime import session_runner
 from realizer.server.serve import Server
 from realizer.server.transports import asap
 from realizer.server.transports.asap import AsapTransport
+from tests.waiting import LIMIT
 
-LIMIT = 30  # s; a hung test ends
 CORE = "{http://www.bml-initiative.org/bml/bml-1.0}"
 NOD = '<bml xmlns="http://www.bml-initiative.org/bml/bml-1.0" id="{}">\n<head id="n" lexeme="NOD"/>\n</bml>\n'
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>\n'

@@ -17,8 +17,7 @@ from realizer.server.serve import Server
 from realizer.server.transports import broker
 from realizer.server.transports.broker import BrokerConnection
 from realizer.server.transports.message_formats import Message
-
-LIMIT = 10  # s; a hung test ends
+from tests.waiting import LIMIT
 
 
 def frame(body: str | bytes = b"", **headers: str) -> SimpleNamespace:
@@ -98,14 +97,28 @@ def test_broker_connection_is_lost_after_its_reason_is_known(monkeypatch: pytest
     connected(test)
 
 
+class Ahead(threading.BoundedSemaphore):
+    """Says when a message has to wait."""
+
+    def __init__(self, value: int) -> None:
+        super().__init__(value)
+        self.held_back = threading.Event()
+
+    def acquire(self, blocking: bool = True, timeout: float | None = None) -> bool:
+        if not super().acquire(blocking=False):
+            self.held_back.set()
+            super().acquire()
+        return True
+
+
 def test_broker_connection_takes_one_message_at_a_time() -> None:
     async def test(connection: BrokerConnection, taken: list[tuple[int, bytes]]) -> None:
+        connection._ahead = ahead = Ahead(broker.AHEAD)
         in_thread(connection.on_message, frame("Grüße", subscription="1"))
         second = threading.Thread(target=connection.on_message, args=(frame(b"\0", subscription="0"),))
         second.start()
-        await asyncio.sleep(0.05)
+        assert await asyncio.to_thread(ahead.held_back.wait, LIMIT)
         assert taken == [(1, "Grüße".encode())]
-        assert second.is_alive()
         connection.handled()
         second.join(LIMIT)
         await asyncio.sleep(0)

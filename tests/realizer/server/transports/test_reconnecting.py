@@ -10,8 +10,7 @@ import pytest
 
 from realizer.server.transports import reconnecting
 from realizer.server.transports.reconnecting import ReconnectingTransport
-
-LIMIT = 10  # s; a hung test ends
+from tests.waiting import LIMIT
 
 
 class Scripted(ReconnectingTransport):

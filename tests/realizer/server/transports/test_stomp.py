@@ -18,10 +18,10 @@ from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.stomp import StompTransport
 from tests.realizer.server.transports.conftest import free_port
+from tests.waiting import LIMIT
 
 pytestmark = pytest.mark.xdist_group("brokers")
 
-LIMIT = 60  # s; a hung test ends
 NOD = '<bml id="{}"><head id="n" lexeme="NOD"/></bml>'
 WAIT = '<bml id="{}"><wait id="w" duration="{}"/></bml>'
 

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 from realizer.server.runtime.session_registry import SESSION_ID
 from realizer.server.transports import tcp_listener
 from realizer.server.transports.tcp_listener import TcpTransport, session_name
-
-LIMIT = 10  # s; a hung test ends
+from tests.waiting import LIMIT, wait_for
 
 
 class Echo(TcpTransport):
@@ -71,11 +70,6 @@ async def line_of(transport: Echo, line: bytes) -> tuple[bytes, asyncio.StreamRe
         return b"", reader, writer
 
 
-async def until(condition: Callable[[], bool]) -> None:
-    while not condition():
-        await asyncio.sleep(0.01)
-
-
 @given(st.sampled_from(["asap", "xface"]), st.ip_addresses().map(str) | st.text(max_size=200))
 def test_session_name_is_a_valid_name_of_a_session(transport: str, host: str) -> None:
     name = session_name(transport, host)
@@ -101,7 +95,7 @@ def test_tcp_transport_counts_its_clients() -> None:
         assert got == b"here\n"
         assert len(transport) == 1
         writer.close()
-        await until(lambda: len(transport) == 0)
+        await wait_for(lambda: len(transport) == 0)
 
     opened(test)
 
@@ -112,7 +106,7 @@ def test_tcp_transport_limits_the_connections_of_an_address(caplog: pytest.LogCa
         assert (await line_of(transport, b"x\n"))[0] == b""
         assert not second[2].is_closing()
         first[2].close()
-        await until(lambda: len(transport) == 1)
+        await wait_for(lambda: len(transport) == 1)
         assert (await line_of(transport, b"x\n"))[0] == b"x\n"
 
     with caplog.at_level(logging.WARNING):
@@ -140,7 +134,7 @@ def test_tcp_transport_logs_an_error_and_ends_that_connection_only(caplog: pytes
     async def test(transport: Echo) -> None:
         stays = await line_of(transport, b"x\n")
         assert (await line_of(transport, b"fail\n"))[0] == b""
-        await until(lambda: len(transport) == 1)
+        await wait_for(lambda: len(transport) == 1)
         assert not stays[2].is_closing()
 
     with caplog.at_level(logging.ERROR):

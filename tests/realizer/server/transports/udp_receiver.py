@@ -9,8 +9,7 @@ from websockets.asyncio.client import connect
 
 from realizer.core.settings import Settings
 from realizer.server.serve import Server
-
-LIMIT = 30  # s; a hung test ends
+from tests.waiting import LIMIT
 
 
 class Receiver(asyncio.DatagramProtocol):

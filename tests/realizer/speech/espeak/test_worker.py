@@ -11,6 +11,7 @@ from realizer.core.errors import VoiceError
 from realizer.speech.engine_voice import RUN
 from realizer.speech.espeak.voice import ENGINE, EspeakVoice, choose_voice
 from realizer.speech.utterance import SpeechRequest, Utterance
+from tests.waiting import LIMIT
 
 pytestmark = pytest.mark.espeak
 
@@ -50,7 +51,7 @@ def test_worker_ends_with_its_parent() -> None:
     assert worker.stdout is not None
     assert worker.stdout.readline().startswith(b'{"rate"')
     worker.stdin.close()  # as the system does when the parent dies
-    assert worker.wait(10) == 0
+    assert worker.wait(LIMIT) == 0
     worker.stdout.close()
 
 

@@ -19,8 +19,8 @@ from realizer.server.transports.xface import player as xface_player
 from realizer.server.transports.xface.player import NUMBERS, PATIENCE, PlayerLink, State, XfacePlayerTransport
 from realizer.server.transports.xface.server import XfaceTransport
 from realizer.server.transports.xface.wire import Task, TaskReader, pack_note
+from tests.waiting import LIMIT, wait_for
 
-LIMIT = 30  # s; a hung test ends
 CHUNK = 40_000  # bytes of one read of the player
 TASK = re.compile(
     r'<task name="(\w+)" ownerId="(\d+)" taskId="(\d+)">(?:<param>(.*)</param>)?</task>\0', re.S
@@ -221,8 +221,7 @@ def test_player_that_is_gone_leaves_the_session() -> None:
         await hold(server, '{"type":"set","faps":{"open_jaw":500}}')
         await player.until(lambda: {3: 500} in player.shown)
         player.close()
-        while server._sessions.health()["connections"]:
-            await asyncio.sleep(0.01)
+        await wait_for(lambda: not server._sessions.health()["connections"])
 
     playing(test)
 

@@ -15,8 +15,8 @@ from realizer.core.settings import Settings
 from realizer.server.serve import Server
 from realizer.server.transports.xface import server as xface
 from realizer.server.transports.xface.server import XfaceTransport
+from tests.waiting import LIMIT
 
-LIMIT = 30  # s; a hung test ends
 MASK = " ".join("1" if fap in (3, 48) else "0" for fap in range(1, 69))
 # The pattern that the second client waits for, letter by letter.
 GREETING = re.compile(
