@@ -21,6 +21,9 @@ from realizer.core.threads import SINGLE_THREAD
 from realizer.face.model import Face
 from realizer.render.backdrop import channels
 
+# s; the first check in a new installation compiles, which takes a minute on a free core.
+CHECK_LIMIT = 600
+
 
 @dataclass(frozen=True)
 class Open:
@@ -162,7 +165,7 @@ def available_backend(backend: str | None = None) -> tuple[str, str | None]:
         env=_environment(),
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=CHECK_LIMIT,
         check=False,
     )
     lines = (done.stdout.strip() or done.stderr.strip()).splitlines()

@@ -138,8 +138,8 @@ def test_serve_plays_on_when_another_client_leaves() -> None:
         async with connect(f"{server.url}?session=show") as stays:
             leaves = await connect(f"{server.url}?session=show")
             await leaves.send(json.dumps({"type": "subscribe", "stream": "fap", "fps": 240}))
-            await leaves.recv()
             await leaves.send(DOCUMENT)
+            await until(stays, "b:start")
             leaves.transport.abort()
             await until(stays, "b:end")
 

@@ -20,7 +20,6 @@ from realizer.server.serve import Server
 from tests.waiting import LIMIT
 
 
-
 class Served:
     """A served application: `get("/healthz")` and the like return (status, headers, body)."""
 

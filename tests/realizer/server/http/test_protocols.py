@@ -22,7 +22,6 @@ from realizer.server.serve import Server
 from tests.waiting import LIMIT
 
 
-
 def answers(*requests: bytes) -> list[bytes]:
     """Return what the service answers to each request on a connection of its own."""
 

@@ -13,6 +13,7 @@ from threading import Event, Thread
 
 import pytest
 
+from realizer.server.transports.rate_limiter import RateLimiter
 from tests.waiting import LIMIT
 
 JARS = Path("/usr/share/activemq/lib")  # where Debian's package has them
@@ -216,3 +217,10 @@ def rabbit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rabbit]:
     rabbit.start()
     yield rabbit
     rabbit.kill()
+
+
+@pytest.fixture
+def all_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let messages come at one instant, however slowly this machine sends them, with short pauses."""
+    wait = RateLimiter.wait
+    monkeypatch.setattr(RateLimiter, "wait", lambda limiter, _, *count: min(wait(limiter, 0.0, *count), 0.01))

@@ -344,7 +344,7 @@ def test_admission_by_any_address_needs_a_service_on_all_of_them() -> None:
     serving(local)
 
 
-def test_admission_reads_a_flood_slowly_and_loses_nothing() -> None:
+def test_admission_reads_a_flood_slowly_and_loses_nothing(all_at_once) -> None:
     async def test(server: Server) -> None:
         async with connect(server.url) as socket:
             for k in range(8):

@@ -471,7 +471,7 @@ def test_asap_limits_the_connections_of_an_address(caplog: pytest.LogCaptureFixt
     serving(test, max_connections=1)
 
 
-def test_asap_reads_a_flood_slowly_and_loses_nothing() -> None:
+def test_asap_reads_a_flood_slowly_and_loses_nothing(all_at_once) -> None:
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send("".join(f'<bml id="b{n}"/>' for n in range(8)))

@@ -245,7 +245,9 @@ def test_stomp_refuses_a_message_that_is_too_large_and_plays_the_next(broker) ->
     serving(test, broker.address, max_message=400)
 
 
-def test_stomp_reads_a_flood_slowly_and_loses_nothing(broker, caplog: pytest.LogCaptureFixture) -> None:
+def test_stomp_reads_a_flood_slowly_and_loses_nothing(
+    broker, all_at_once, caplog: pytest.LogCaptureFixture
+) -> None:
     async def test(server: Server) -> None:
         async with Peer(broker.port, "/topic/bmlFeedback") as peer:
             for n in range(8):

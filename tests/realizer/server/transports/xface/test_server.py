@@ -521,6 +521,7 @@ def test_xface_limits_the_number_of_clients(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_xface_reads_a_flood_slowly_and_loses_nothing(
+    all_at_once,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     async def test(server: Server, transport: XfaceTransport) -> None:
