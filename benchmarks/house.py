@@ -1,7 +1,7 @@
 """Measures the structure of the code: `python benchmarks/house.py [CHECKOUT ...]` prints a table.
 
-The table counts Python files of bml_schema, realizer and tests. All imports count, also those in functions
-and for types; an import from a package counts for its `__init__`, unless it names a module. Files that import
+The table counts Python files of the packages, tests, benchmarks and training scripts. All imports
+count, also those in functions and for types; an import from a package counts for its `__init__`, unless it names a module. Files that import
 each other, directly or not, form a circle. The tests of a module are in tests/PACKAGE/test_MODULE.py.
 Parameters of commands do not count. Below the table are the circles, and the paths of a document and of a
 frame.
@@ -28,7 +28,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-PACKAGES = ("bml_schema", "realizer")
+PACKAGES = ("bml_schema", "realizer", "realizer_studio")
+ENGINE = PACKAGES[:2]
+BESIDE = ("tests", "benchmarks", "training")
 SERVICE = ("server", "protocol")  # folders of realizer that are counted in the paths
 LONG_NAME = 70
 PART = "  realizer/"  # prefix of the rows of its folders
@@ -40,7 +42,7 @@ class Checkout:
 
     def __init__(self, root: Path) -> None:
         self.root = root
-        found = (path for package in (*PACKAGES, "tests") for path in (root / package).rglob("*.py"))
+        found = (path for package in (*PACKAGES, *BESIDE) for path in (root / package).rglob("*.py"))
         inside = sorted(path.relative_to(root) for path in found)
         # Without the packages of npm, and the faces in a wheel.
         self.files = [path for path in inside if not {"node_modules", "_faces"} & set(path.parts)]
@@ -74,9 +76,23 @@ class Checkout:
     @cached_property
     def circles(self) -> list[list[Path]]:
         """Groups of files that import each other, the largest group first."""
-        reached = {path: _reach(self.imports, path) for path in self.ours}
-        groups = {frozenset(p for p in reached[path] if path in reached[p]) for path in self.ours}
-        return sorted((sorted(group) for group in groups if len(group) > 1), key=lambda g: (-len(g), g))
+        return _circles(self.imports)
+
+    @cached_property
+    def circles_by_string(self) -> list[list[Path]]:
+        """Groups of folders that import each other, or name each other's modules in strings."""
+        graph: dict[Path, set[Path]] = {}
+        for path in self.ours:
+            strings = (
+                node.value.partition(":")[0]
+                for node in ast.walk(self.trees[path])
+                if isinstance(node, ast.Constant) and isinstance(node.value, str)
+            )
+            named = {self.modules[text] for text in strings if "." in text and text in self.modules}
+            folder = Path(*path.parts[:2])  # a module beside the folders, such as pipeline.py, is its own
+            graph.setdefault(folder, set()).update(Path(*p.parts[:2]) for p in self.imports[path] | named)
+        root = Path("realizer/__init__.py")  # it hands names out, lazily
+        return _circles({folder: used - {root} for folder, used in graph.items() if folder != root})
 
     @cached_property
     def untested(self) -> list[Path]:
@@ -96,9 +112,11 @@ class Checkout:
     def table(self) -> dict[str, str]:
         """Return the rows of the table."""
         rows = {}
-        for package in (*PACKAGES, "tests"):
+        for package in (*PACKAGES, *BESIDE):
             inside = [path for path in self.files if path.parts[0] == package]
             rows[f"{package}: files, lines"] = f"{len(inside)}, {self.lines(inside):,}"
+        engine = [path for path in self.ours if path.parts[0] in ENGINE]
+        rows["the engine: files, lines"] = f"{len(engine)}, {self.lines(engine):,}"
         rows["the library: files, lines"] = f"{len(self.ours)}, {self.lines(self.ours):,}"
         parts = {path.parts[1] for path in self.ours if path.parts[0] == "realizer" and len(path.parts) > 2}
         for part in sorted(parts):
@@ -109,6 +127,9 @@ class Checkout:
         rows["largest folders"] = _most(flat)
         rows["  with what is below them"] = _most(deep)
         rows["circles of imports: files in each"] = ", ".join(str(len(c)) for c in self.circles) or "none"
+        rows["  of folders, by strings too"] = (
+            "; ".join(" ".join(map(str, circle)) for circle in self.circles_by_string) or "none"
+        )
         rows["modules without a test of their name"] = (
             f"{len(self.untested)}, {self.lines(self.untested):,} lines"
         )
@@ -144,6 +165,12 @@ def _reach(imports: Mapping[Path, set[Path]], path: Path) -> set[Path]:
         reached |= new
         left += new
     return reached
+
+
+def _circles(imports: Mapping[Path, set[Path]]) -> list[list[Path]]:
+    reached = {path: _reach(imports, path) for path in imports}
+    groups = {frozenset(p for p in reached[path] if path in reached[p]) for path in imports}
+    return sorted((sorted(group) for group in groups if len(group) > 1), key=lambda g: (-len(g), g))
 
 
 def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
