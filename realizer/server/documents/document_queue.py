@@ -13,11 +13,11 @@ from realizer.playback.feedback_events import parse_warning
 from realizer.playback.player import Player
 from realizer.playback.speaking import stretch_to_fit, without_stretch
 from realizer.scheduling.timing import Warning
+from realizer.server.documents.limits import block_limit_error, size_error
 from realizer.server.documents.pending_blocks import (
     PendingBlock,
     PendingBlocks,
     TtsRequests,
-    block_limit_error,
 )
 from realizer.server.session.effects import Effect
 from realizer.server.speech.speech_streams import SpeechStreams
@@ -304,17 +304,3 @@ def block_id_of(message: str) -> str:
     begin = max(0, *(message.rfind(f"<bml{blank}") for blank in " \t\r\n"))
     match = _BLOCK_ID.search(message, begin, begin + 4096)
     return match[1] if match else "<no id>"
-
-
-def size_error(text: str, settings: Settings) -> str | None:
-    """Return why the documents of a message are refused, or None."""
-    size = len(text) if text.isascii() else len(text.encode("utf-8", "surrogatepass"))
-    if size > settings.max_document:
-        words = f"wanted at most {settings.max_document} bytes of BML in a message, got {size}"
-        return f"{words} {limit_hint('max_document')}"
-    # Comments are counted as elements too; a document has few of them.
-    count = text.count("<") - text.count("</")
-    if count > settings.max_elements:
-        words = f"wanted at most {settings.max_elements} elements in a message, got {count}"
-        return f"{words} {limit_hint('max_elements')}"
-    return None

@@ -6,18 +6,16 @@ Long texts are requested in parts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from bml_schema import Block, ParameterValueChange, Speech
+from bml_schema import Block, ParameterValueChange
 from realizer.core import work
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.core.settings import Settings, limit_hint
 from realizer.playback.player import Player
 from realizer.playback.references import references
 from realizer.scheduling.timing import Warning
-from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.session.effects import Speak
 from realizer.server.speech.long_text import LongText, spoken_length, trim_final_pause
 from realizer.speech.duration_fit import allow_small_warp, silent_fallback
@@ -281,25 +279,3 @@ class TtsRequests:
 def is_long(request: SpeechRequest) -> bool:
     """Whether a request should be synthesized in parts."""
     return request.seconds is None and request.recording is None and spoken_length(request.ssml) > SHORT
-
-
-def block_limit_error(
-    block: Block, settings: Settings, busy: int, characters: Collection[str | None]
-) -> str | None:
-    """Return why a session refuses a block, or None."""
-    longest = _longest_speech(block)
-    if longest > settings.max_speech:
-        words = f"wanted at most {settings.max_speech} characters in one speech, got {longest}"
-        return f"{words} {limit_hint('max_speech')}"
-    if busy >= settings.max_blocks:
-        words = f"{settings.max_blocks} blocks play or wait: wanted fewer at a time"
-        return f"{words} {limit_hint('max_blocks')}"
-    if block.character_id not in (None, *characters) and len(characters) >= MAX_CHARACTERS:
-        return f"wanted at most {MAX_CHARACTERS} characters in a session"
-    return None
-
-
-def _longest_speech(block: Block) -> int:
-    speeches = [node for node in block.behaviours if isinstance(node, Speech)]
-    texts = [sum(len(part) for part in s.text.parts if isinstance(part, str)) for s in speeches if s.text]
-    return max([0, *texts, *(len(form.content) for s in speeches for form in s.descriptions)])

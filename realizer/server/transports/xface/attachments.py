@@ -16,7 +16,7 @@ from realizer.behaviours.media import media_file
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, limit_hint
-from realizer.server.documents.document_queue import size_error
+from realizer.server.documents.limits import size_error
 from realizer.server.transports.xface.wire import Task
 
 ROOM = 2**10  # bytes of a document beside its keyframes

@@ -8,7 +8,7 @@ from bml_schema import Block, BlockProgress, PredictionFeedback, SyncPointProgre
 from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
-from realizer.server.documents.document_queue import DocumentQueue, block_id_of, size_error
+from realizer.server.documents.document_queue import DocumentQueue, block_id_of
 from realizer.server.session.due_work import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
@@ -132,18 +132,6 @@ def test_document_queue_loses_one_message_by_a_bug_of_the_reader(
     assert isinstance(first, Warning)
     assert "internal error" in first.text
     assert isinstance(second, Block)
-
-
-def test_size_error_counts_bytes_and_elements() -> None:
-    text = '<bml id="b"><!-- é --><wait id="w"/></bml>'
-    size = len(text.encode())
-    assert size_error(text, Settings(max_document=size, max_elements=3)) is None  # a comment counts
-    words = size_error(text, Settings(max_document=size - 1))
-    assert words == (
-        f"wanted at most {size - 1} bytes of BML in a message, got {size} (REALIZER_MAX_DOCUMENT sets it)"
-    )
-    words = size_error(text, Settings(max_elements=2))
-    assert words == "wanted at most 2 elements in a message, got 3 (REALIZER_MAX_ELEMENTS sets it)"
 
 
 def test_submission_plans_all_documents_of_a_message_for_one_instant() -> None:

@@ -15,11 +15,19 @@ from realizer.core.settings import Settings
 from realizer.scheduling.timing import Schedule
 from realizer.server.documents import limits
 from realizer.server.documents.limits import (
+    MAX_CHARACTERS,
+    block_limit_error,
     duration_error,
     memory_error,
     pixel_rate_error,
+    size_error,
 )
 
+ONE = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
+SSML = (
+    '<bml id="b"><speech id="s"><text>Oh</text>'
+    '<description priority="1" type="application/ssml+xml"><speak>{}</speak></description></speech></bml>'
+)
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
 
 
@@ -69,3 +77,50 @@ def test_pixel_rate_error_allows_large_pictures_at_a_low_rate() -> None:
 def test_limits_have_different_descriptions_in_the_settings() -> None:
     descriptions = {f.name: f.metadata["description"] for f in fields(Settings) if f.name.startswith("max_")}
     assert len(descriptions) == len(set(descriptions.values())) == 15
+
+
+def test_size_error_counts_bytes_and_elements() -> None:
+    text = '<bml id="b"><!-- é --><wait id="w"/></bml>'
+    size = len(text.encode())
+    assert size_error(text, Settings(max_document=size, max_elements=3)) is None  # a comment counts
+    words = size_error(text, Settings(max_document=size - 1))
+    assert words == (
+        f"wanted at most {size - 1} bytes of BML in a message, got {size} (REALIZER_MAX_DOCUMENT sets it)"
+    )
+    words = size_error(text, Settings(max_elements=2))
+    assert words == "wanted at most 2 elements in a message, got 3 (REALIZER_MAX_ELEMENTS sets it)"
+
+
+@pytest.mark.parametrize(
+    ("most", "text", "busy", "says"),
+    [
+        (
+            {"max_speech": 20},
+            ONE.format("Hello " * 4),
+            0,
+            "at most 20 characters in one speech, got 24",
+        ),
+        ({"max_speech": 60}, SSML.format("Hello " * 20), 0, "at most 60 characters in one speech"),
+        ({"max_blocks": 2}, '<bml id="b"/>', 2, "2 blocks play or wait: wanted fewer at a time"),
+    ],
+)
+def test_block_limit_error_names_the_limit_and_its_setting(
+    most: dict[str, int], text: str, busy: int, says: str
+) -> None:
+    words = block_limit_error(block(text), Settings(**most), busy, ())
+    assert words is not None
+    assert says in words
+    (name,) = most
+    assert words.endswith(f"(REALIZER_{name.upper()} sets it)")
+    assert block_limit_error(block(text), Settings(), busy, ()) is None
+
+
+def test_block_limit_error_bounds_the_number_of_characters() -> None:
+    crowd = [f"c{k}" for k in range(MAX_CHARACTERS)]
+    known, new = (block(f'<bml id="b" characterId="{name}"/>') for name in ("c3", "another"))
+    assert block_limit_error(new, Settings(), 0, crowd[:-1]) is None
+    assert block_limit_error(known, Settings(), 0, crowd) is None
+    assert (
+        block_limit_error(new, Settings(), 0, crowd)
+        == f"wanted at most {MAX_CHARACTERS} characters in a session"
+    )

@@ -11,14 +11,11 @@ from bml_schema import Block, parse
 from bml_schema.feedback import PredictionFeedback, SyncPointProgress, WarningFeedback
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.errors import VoiceError
-from realizer.core.settings import Settings
-from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.server.documents.pending_blocks import (
     PATIENCE,
     SHORT,
     PendingBlock,
     PendingBlocks,
-    block_limit_error,
     is_long,
 )
 from realizer.speech.duration_fit import speak_to_length
@@ -398,45 +395,3 @@ def test_replaced_by_returns_the_blocks_that_arrived_before(pending) -> None:
     pending.add(new := PendingBlock(block('<bml id="r" composition="REPLACE"/>'), 0, 1.0))
     pending.add(PendingBlock(block('<bml id="later"/>'), 0, 1.0))
     assert [w.block.id for w in pending.replaced_by(new)] == ["a"]
-
-
-ONE = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'
-SSML = (
-    '<bml id="b"><speech id="s"><text>Oh</text>'
-    '<description priority="1" type="application/ssml+xml"><speak>{}</speak></description></speech></bml>'
-)
-
-
-@pytest.mark.parametrize(
-    ("most", "text", "busy", "says"),
-    [
-        (
-            {"max_speech": 20},
-            ONE.format("Hello " * 4),
-            0,
-            "at most 20 characters in one speech, got 24",
-        ),
-        ({"max_speech": 60}, SSML.format("Hello " * 20), 0, "at most 60 characters in one speech"),
-        ({"max_blocks": 2}, '<bml id="b"/>', 2, "2 blocks play or wait: wanted fewer at a time"),
-    ],
-)
-def test_block_limit_error_names_the_limit_and_its_setting(
-    most: dict[str, int], text: str, busy: int, says: str
-) -> None:
-    words = block_limit_error(block(text), Settings(**most), busy, ())
-    assert words is not None
-    assert says in words
-    (name,) = most
-    assert words.endswith(f"(REALIZER_{name.upper()} sets it)")
-    assert block_limit_error(block(text), Settings(), busy, ()) is None
-
-
-def test_block_limit_error_bounds_the_number_of_characters() -> None:
-    crowd = [f"c{k}" for k in range(MAX_CHARACTERS)]
-    known, new = (block(f'<bml id="b" characterId="{name}"/>') for name in ("c3", "another"))
-    assert block_limit_error(new, Settings(), 0, crowd[:-1]) is None
-    assert block_limit_error(known, Settings(), 0, crowd) is None
-    assert (
-        block_limit_error(new, Settings(), 0, crowd)
-        == f"wanted at most {MAX_CHARACTERS} characters in a session"
-    )
