@@ -22,9 +22,9 @@ from bml_schema.document_splitter import (
 )
 from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.encodings import decode, is_declared, without_controls
-from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError
+from bml_schema.errors import NOT_BML_1_0, BMLError, BMLSizeError, BMLSyntaxError, Fault
 from bml_schema.node_schema import local
-from bml_schema.nodes import Block
+from bml_schema.nodes import CORE, Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.speech_rescue import rescue
 from bml_schema.ssml import document_of, start_of_speak
@@ -295,21 +295,27 @@ class _Reader:
                 plain = error
             if isinstance(plain, Block) and not plain.problems and not has_words_of_dialects(plain):
                 return plain
-        from bml_schema.dialects.translator import translate
+        from bml_schema.dialects.translator import translate, translate_elements
 
         for node in root.iter() if begins else ():
             # Translation may change the names by which `begins` finds lines.
             any_node: Any = node
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
-        report = translate(root, self.wrapper, self.block_ids)
+        is_core = plain is not None and str(root.tag).startswith(f"{{{CORE}}}")
+        report = "" if is_core else translate(root, self.wrapper, self.block_ids).text
+        # A document in the namespace of BML 1.0 stays that, whatever some of its elements are.
+        parts = translate_elements(root) if is_core else {}
+        report = report or parts.pop(root, "")
         if isinstance(plain, BMLError) and not report:
             raise plain
         rescued = rescue(root, ElementReader(self.vocabulary))
+        for part, text in parts.items():
+            rescued.setdefault(part, []).append(Fault(text, part, NOT_BML_1_0))
         if isinstance(plain, Block) and not (report or rescued or _speech_is_lost(plain)):
             return plain
-        begins = {} if report else begins
-        return block(begins=begins, notes=(*notes, report.text) if report else notes, rescued=rescued)
+        begins = {} if report or parts else begins
+        return block(begins=begins, notes=(*notes, report) if report else notes, rescued=rescued)
 
     def _read_strictly(self, root: etree._Element, block: Callable[..., Block]) -> Block:
         """Read BML 1.0 only; if there are faults, say of which dialect they are words."""

@@ -35,7 +35,7 @@ from bml_schema.nodes import (
     extension,
 )
 from bml_schema.ssml import described, is_marked_up
-from bml_schema.sync_refs import Names, SyncRef, read_sync_ref
+from bml_schema.sync_refs import Names, SyncRef, read_sync_ref, respelled
 from bml_schema.text_reader import read_mixed
 from bml_schema.values import NUMBER, describe_mismatch
 
@@ -69,9 +69,10 @@ class ElementReader:
         lenient: whether other documents than BML 1.0 are read if their meaning is clear.
         remarks: faults that do not drop a behaviour, such as unknown attributes; the caller clears them.
         forgiving: whether attributes with faults are left out, with a remark.
+        respelled: times that are written in another way, and how they were read, in words.
     """
 
-    __slots__ = ("forgiving", "lenient", "names", "remarks", "vocabulary")
+    __slots__ = ("forgiving", "lenient", "names", "remarks", "respelled", "vocabulary")
 
     def __init__(self, vocabulary: Vocabulary, names: Names | None = None, *, lenient: bool = True) -> None:
         self.vocabulary = vocabulary
@@ -79,6 +80,7 @@ class ElementReader:
         self.lenient = lenient
         self.forgiving = False
         self.remarks: list[Fault] = []
+        self.respelled: list[str] = []
 
     def tag(self, element: etree._Element) -> str:
         """Return the Clark tag; elements without namespace, or of a draft, are core or extension elements."""
@@ -130,11 +132,11 @@ class ElementReader:
             try:
                 if spec is None:
                     if name in points:
-                        syncs[name] = read_sync_ref(text, self.names)
+                        syncs[name] = self.time(text, element, points)
                     else:
                         foreign[name] = text
                 elif spec.read is None:
-                    values[spec.field] = read_sync_ref(text, self.names)
+                    values[spec.field] = self.time(text, element)
                 else:
                     values[spec.field] = spec.read(text)
             except ValueError as error:
@@ -303,9 +305,22 @@ class ElementReader:
         if text is None:
             raise Fault("ref: wanted a sync reference, got none", element)
         try:
-            return read_sync_ref(text, self.names)
+            return self.time(text, element)
         except ValueError as error:
             raise Fault(f"ref: {error}", element) from None
+
+    def time(self, text: str, element: etree._Element, points: Iterable[str] = ()) -> SyncRef:
+        """Read a sync reference, also in the forms in which programs write them; `points` are its own."""
+        try:
+            return read_sync_ref(text, self.names)
+        except ValueError:
+            id = element.get("id", "").strip() if points else ""
+            meant = respelled(text, id, points) if self.lenient else ""
+            if not meant:
+                raise
+            ref = read_sync_ref(meant, self.names)
+            self.respelled.append(f"{quoted(text)} as {quoted(meant)}")
+            return ref
 
 
 def _read_draft_attributes(

@@ -66,8 +66,8 @@ def read_block(
         max_behaviours: the limit of behaviours and constraints together.
         lenient: what is not BML 1.0 is read where its meaning is plain.
         notes: what was read as something else; they become one Problem of the block.
-        rescued: speech -> what was wrong with it (`speech_rescue`); attributes of speech with faults are then
-            left out. None drops speech with faults.
+        rescued: element -> how it was read; attributes of speech with faults are then left out. None drops
+            speech with faults.
 
     Raises:
         BMLError: not a <bml>, no usable id, or too many behaviours.
@@ -101,6 +101,9 @@ def read_block(
             names.block, Fault(f"wanted elements, got the text {quoted(text)}", parent), path, parent
         )
     children = tuple(reader.children(tree))
+    if respelled := list(dict.fromkeys(elements.respelled)):
+        text = f"times are read as BML 1.0 writes them: {listed(respelled, 3)}"
+        reader.problem(names.block, Fault(text, root, NOT_BML_1_0), "/bml", root, dropped=False)
     next_element()
     block = Block(**values, children=children, problems=tuple(reader.problems), places=reader.places)
     block = reader.pruned(block)
@@ -210,9 +213,10 @@ class _Reader:
         """Return the node of an entry, or None, with a Problem, if it is dropped."""
         next_element()
         remarks = self.elements.remarks
+        if self.rescued:
+            remarks += self.rescued.get(entry.element, ())
         if self.rescued is not None and entry.kind.cls is Speech:
             self.elements.forgiving = not entry.required
-            remarks += self.rescued.get(entry.element, ())
             entry = entry if entry.required else self.with_id(entry)
         try:
             is_constraint = entry.kind.tag == Constraint.tag

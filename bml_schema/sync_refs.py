@@ -113,6 +113,39 @@ def read_sync_ref(text: str, names: Names | None = None) -> SyncRef:
     return likely
 
 
+# A number as programs write it: a tiny one with an exponent, or with a unit; behind a point with a sign.
+_WRITTEN = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE]-\d{1,3})?"
+_UNIT = r"\s*(ms|s|secs?|seconds?)?"
+_ALONE = re.compile(rf"()([+-]?)\s*({_WRITTEN}){_UNIT}")
+_BEHIND = re.compile(rf"([^\s\d+-].*?)\s*([+-])\s*({_WRITTEN}){_UNIT}")
+_POINT = re.compile(r"([A-Za-z_-]+(?::\d{1,6})?)\s*((?:[+-]\s*(?:\d+(?:\.\d*)?|\.\d+))?)")
+
+
+def respelled(text: str, behaviour: str, points: Iterable[str]) -> str:
+    """Return the reference that a program means which writes it in another form, or "".
+
+    Args:
+        text: such as "start+1", "1e-05", "500ms" or "s1:end+0.5s".
+        behaviour: id of the behaviour whose points may be named without it; "" for none.
+        points: the names of its sync points.
+    """
+    text = text.strip()
+    if len(text) > _LONGEST:
+        return ""
+    meant = text
+    if (found := _ALONE.fullmatch(text) or _BEHIND.fullmatch(text)) is not None:
+        point, sign, number, unit = found.groups()
+        seconds = float(number) * (0.001 if unit == "ms" else 1.0)
+        if not seconds <= MAX_SECONDS:
+            return ""
+        meant = f"{point} {sign} {decimal(seconds)}" if point else f"{sign}{decimal(seconds)}"
+    if behaviour and (own := _POINT.fullmatch(meant)) is not None:
+        name = own[1].replace("_", "").replace("-", "").lower()
+        point = next((point for point in points if point.lower() == name), "")
+        meant = f"{behaviour}:{point} {own[2]}".strip() if point else meant
+    return "" if meant.replace(" ", "") == text.replace(" ", "") else meant
+
+
 def _seconds(text: str) -> float:
     value = float(text)
     if not abs(value) <= MAX_SECONDS:

@@ -40,12 +40,17 @@ name the dialect. One warning a document, of the type `NOT_BML_1_0`, says what w
     b: NOT_BML_1_0: line 1, /bml: read as SmartBody's BML: <head type="NOD"> as lexeme=NOD
 
 - **When.** A document is in a dialect if it is inside `<act>` (SmartBody) or `<fml-apml>` (Greta), is in
-  the namespace of the drafts, or has a word of one of the first three tables below. Other documents are
-  BML 1.0, and their faults are not repaired.
+  the namespace of the drafts, or has no namespace and a word of one of the first three tables below. Other
+  documents are BML 1.0, and their faults are not repaired.
+- **In BML 1.0.** A document in the namespace of BML 1.0 stays BML 1.0. An element in it that has such a word
+  is read with a warning of its own, and one that is removed in the tables is unknown, with its own warning.
 - **Ids.** In a dialect, a block without an id becomes `unnamed1`, `unnamed2`, ... (different for all
   documents of a session), and behaviours without an id of their own become `head1`, `face2`, ...
 - **Sync points.** A reference to a point that a behaviour does not have in BML 1.0 means the one in its
   place: `f:stroke` of a face is `f:attackPeak`.
+- **Times of programs.** In any document, points of the behaviour itself may be named without its id
+  (`end="start+1"`), and seconds may have a unit (`500ms`) or a negative exponent (`1e-05`), with one warning
+  a document.
 - **Output.** What is read is BML 1.0: `realizer schedule --bml` and `bml_schema.write` write it.
 
 Independently of dialects, without a warning: words of closed lists may be in any case (`side="left"`), a

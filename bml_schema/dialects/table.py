@@ -119,7 +119,9 @@ class Report:
 
     @property
     def text(self) -> str:
-        """The text of the warning that lists the translations."""
+        """The text of the warning that lists the translations, "" if there are none."""
+        if not self:
+            return ""
         ignored = dict.fromkeys(row.name for row in self.rows if _is_ignored(row))
         read = dict.fromkeys(f"{row.name} as {_shown(row)}" for row in self.rows if not _is_ignored(row))
         parts = [listed([*read, *self.made], _MAX_LISTED)] if read or self.made else []

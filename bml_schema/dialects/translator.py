@@ -47,6 +47,27 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> R
     return Report(translation.applied, made, wrapper)
 
 
+def translate_elements(root: etree._Element) -> dict[Any, str]:
+    """Translate, in place, what elements of a BML 1.0 document have from dialects.
+
+    Rows for any dialect do not apply, and no behaviour is removed: what is not known stays unknown.
+
+    Returns:
+        Element, or the root for its attributes -> how it was read.
+    """
+    translation = _Translation(root)
+    read: dict[Any, str] = {}
+    for element in [root, *translation.timed()]:
+        translation.applied = {}
+        if element is root:
+            translation.translate_attributes()
+        else:
+            translation.translate_element(element)
+        if translation.applied:
+            read[element] = Report(translation.applied).text
+    return read
+
+
 def dialect_of(root: etree._Element, wrapper: str) -> str:
     """Return the name of the dialect of a document, "" for BML 1.0; for the arguments see `translate`."""
     report = translate(deepcopy(root), wrapper, repeat("b"))
@@ -66,51 +87,73 @@ class _Translation:
         self.table = table()
         self.applied: dict[Row, None] = {}
         self.in_dialect = False
-        self.used = {e.get("id", "").strip() for e in self._timed()}
+        self.used = {e.get("id", "").strip() for e in self.timed()}
         self.numbers: dict[str, Iterator[int]] = {}
 
     def run(self) -> None:
-        self._attributes(self.root, "bml")
+        self.translate_attributes()
         self._children(self.root)
-        timed = list(self._timed())
-        kinds = {e.get("id", "").strip(): self._kind(e) for e in timed}
-        points = SyncPoints(kinds, self._apply, self.in_dialect)
-        for element in timed:
+        points = self._points()
+        for element in self.timed():
             points.translate(element)
-        for sync in self.root.iter("{*}sync", "{*}before", "{*}after", "{*}synchronize", "{*}synchronise"):
+        self._references(self.root, points)
+
+    def translate_attributes(self) -> None:
+        self._attributes(self.root, "bml")
+
+    def translate_element(self, element: Any) -> None:
+        """Translate one behaviour or constraint, which stays in any case."""
+        self._element(element, stays=True)
+        points = self._points()
+        points.translate(element)
+        self._references(element, points)
+
+    def _points(self) -> SyncPoints:
+        kinds = {e.get("id", "").strip(): self._kind(e) for e in self.timed()}
+        return SyncPoints(kinds, self._apply, self.in_dialect)
+
+    def _references(self, inside: Any, points: SyncPoints) -> None:
+        for sync in inside.iter("{*}sync", "{*}before", "{*}after", "{*}synchronize", "{*}synchronise"):
             if "ref" in sync.attrib:
                 sync.set("ref", points.reference(sync.get("ref")))
 
     def _children(self, parent: Any) -> None:
         for element in list(parent):
-            name, key = self._name(element)
-            if key is None:
-                continue
-            if name == "description":
-                self._attributes(element, name)
-                continue
-            if name in _JOINTS and local(str(parent.tag)) == "gaze":
-                key = name = "sbm:joint"
-            if name == "speech":
-                translate_speech(element, self._apply, words=self.in_dialect)
-            translate_reference(element, name, self._apply)
-            own = self.table.elements.get(key) or self.table.elements.get(name)
-            if not self._attributes(element, name, key):
-                continue
-            if own is not None and own.becomes and not self._translate_element(element, own):
-                continue
-            renamed, _ = self._name(element)
-            if renamed != name and not self._attributes(element, renamed):
-                continue
-            name = renamed
-            if name == "text":  # its content is words, syncs and SSML
-                continue
-            for row in self.table.missing.get(name, ()) if self.in_dialect else ():
-                if not element.get(row.attribute, "").strip():
-                    self._apply(row)
-                    for attribute, value in self._assignments(row, element, ""):
-                        element.set(attribute, value)
-            self._children(element)
+            self._element(element)
+
+    def _element(self, element: Any, *, stays: bool = False) -> None:
+        """Translate an element and what is inside; one that `stays` is not removed."""
+        name, key = self._name(element)
+        if key is None:
+            return
+        if name == "description":
+            self._attributes(element, name)
+            return
+        parent = element.getparent()
+        if name in _JOINTS and local(str(parent.tag)) == "gaze":
+            key = name = "sbm:joint"
+        if name == "speech":
+            translate_speech(element, self._apply, words=self.in_dialect)
+        translate_reference(element, name, self._apply)
+        own = self.table.elements.get(key) or self.table.elements.get(name)
+        if stays and own is not None and own.becomes == "-":
+            return
+        if not self._attributes(element, name, key, stays):
+            return
+        if own is not None and own.becomes and not self._translate_element(element, own):
+            return
+        renamed, _ = self._name(element)
+        if renamed != name and not self._attributes(element, renamed, stays=stays):
+            return
+        name = renamed
+        if name == "text":  # its content is words, syncs and SSML
+            return
+        for row in self.table.missing.get(name, ()) if self.in_dialect else ():
+            if not element.get(row.attribute, "").strip():
+                self._apply(row)
+                for attribute, value in self._assignments(row, element, ""):
+                    element.set(attribute, value)
+        self._children(element)
 
     def _name(self, element: Any) -> tuple[str, str | None]:
         """Return the local name of an element, and its name in the table, or None for an extension."""
@@ -124,8 +167,8 @@ class _Translation:
 
     # attributes
 
-    def _attributes(self, element: Any, name: str, key: str | None = None) -> bool:
-        """Translate the attributes of an element; return whether the element stays."""
+    def _attributes(self, element: Any, name: str, key: str | None = None, stays: bool = False) -> bool:
+        """Translate the attributes of an element; return whether it stays, as with `stays` it does."""
         known = self.table.attributes.get(name) or {}
         if key and key != name:
             known = {**known, **self.table.attributes.get(key, {})}
@@ -136,6 +179,8 @@ class _Translation:
             short = attribute.rpartition("}")[2]
             rows = known.get(short) or (everywhere.get(short) if name in POINTS or key != name else None)
             row = self._row(rows, value) if rows else None
+            if row is not None and row.becomes == "!" and stays:
+                continue
             if row is not None and not self._attribute(element, attribute, value, row):
                 return False
         return True
@@ -203,7 +248,7 @@ class _Translation:
         space = NAMESPACES[prefix] if colon else str(self.root.tag).rpartition("}")[0][1:]
         element.tag = f"{{{space}}}{short}" if space else short
 
-    def _timed(self) -> Iterator[Any]:
+    def timed(self) -> Iterator[Any]:
         """Yield the behaviours."""
         for element in self.root:
             if local(str(element.tag)) == "required":
@@ -220,7 +265,7 @@ class _Translation:
         """Set the ids of behaviours with no id or with that of another one; return descriptions of them."""
         seen: set[str] = set()
         made = []
-        for element in self._timed():
+        for element in self.timed():
             id = element.get("id", "").strip()
             if self._kind(element) == "constraint" or str(element.tag)[1:].startswith(tuple(_OURS)):
                 continue

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bml_schema import SyncRef
-from bml_schema.sync_refs import Names, Points, read_sync_ref
+from bml_schema import CORE, SyncRef, parse
+from bml_schema.sync_refs import Names, Points, read_sync_ref, respelled
 from tests.rows import each_row
 from tests.strategies import numbers
 
@@ -151,3 +151,53 @@ def test_read_sync_ref_of_any_text_is_a_reference_or_a_value_error(text: str) ->
     except ValueError:
         return
     assert read_sync_ref(str(ref)) == ref
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("start+1", "f:start + 1"),
+        ("start + 1.5", "f:start + 1.5"),
+        ("end-.5", "f:end - 0.5"),
+        ("attack_peak", "f:attackPeak"),
+        ("500ms", "0.5"),
+        ("1.5 s", "1.5"),
+        ("1e-05", "0.00001"),
+        ("s:end+1E-3", "s:end + 0.001"),
+        ("my-block:s:end + 20 ms", "my-block:s:end + 0.02"),
+        ("stroke+1", ""),  # no point of a face
+        ("1e3", ""),
+        ("1,5", ""),
+        ("soon", ""),
+        ("start+x", ""),
+        ("99999999s", ""),
+        ("", ""),
+        ("1.5", ""),  # as it is
+        ("a:start + 1", ""),
+    ],
+)
+def test_respelled_has_the_reference_that_a_program_means(written: str, meant: str) -> None:
+    assert respelled(written, "f", ("start", "attackPeak", "relax", "end")) == meant
+
+
+def test_respelled_knows_no_own_points_without_a_behaviour() -> None:
+    assert respelled("start+1", "", ("start", "end")) == ""
+
+
+def test_times_of_programs_cause_one_warning_a_document() -> None:
+    faces = "".join(
+        f'<faceLexeme id="f{k}" lexeme="SMILE" start="{k}" end="start+1"/><head id="h{k}" lexeme="NOD" end="2s"/>'
+        for k in range(5)
+    )
+    block = parse(f'<bml xmlns="{CORE}" id="b">{faces}</bml>')
+    assert len(block.behaviours) == 10
+    assert block["f3"].syncs["end"] == SyncRef(behaviour="f3", sync="start", offset=1.0)
+    (problem,) = block.problems
+    assert (problem.id, problem.type, problem.dropped) == ("b", "NOT_BML_1_0", False)
+    assert problem.text.startswith('times are read as BML 1.0 writes them: "start+1" as "f0:start + 1", ')
+    assert problem.text.endswith("and 3 more")
+
+
+def test_times_of_programs_are_faults_in_strict_bml() -> None:
+    text = f'<bml xmlns="{CORE}" id="b"><head id="h" lexeme="NOD" end="start+1"/></bml>'
+    assert not parse(text, strict_bml=True).behaviours

@@ -12,7 +12,7 @@ from lxml import etree
 from bml_schema import CORE, Block, BMLError, Gaze, Head, made_ids, parse, read, write
 from bml_schema.dialects.recognition import is_draft
 from bml_schema.dialects.table import Row, table
-from bml_schema.dialects.translator import translate
+from bml_schema.dialects.translator import translate, translate_elements
 from bml_schema.node_schema import local
 from bml_schema.vocabulary import VOCABULARY
 from realizer.core.options import PlayOptions
@@ -184,6 +184,34 @@ def test_translate_reads_a_dialect_in_the_namespace_of_bml() -> None:
     block = parse(f'<bml xmlns="{CORE}" id="b"><gaze id="g" target="x" angle="20" direction="LEFT"/></bml>')
     assert block["g"] == Gaze(id="g", target="x", offset_angle=20.0, offset_direction="LEFT")
     assert len(block.problems) == 1
+
+
+def test_translate_keeps_a_document_of_bml_1_0_what_it_is() -> None:
+    block = parse(
+        f'<bml xmlns="{CORE}" id="b"><head id="h" type="NOD"/><gaze id="g" target="x" offsetDirection="UP_LEFT"/>'
+        '<emit id="e"/><event id="v" message="x"/><head id="n" lexeme="Neutral"/><head lexeme="NOD"/></bml>'
+    )
+    assert [b.id for b in block.behaviours] == ["h", "n"]
+    assert {(p.id, p.type) for p in block.problems} == {
+        ("b:h", "NOT_BML_1_0"),
+        ("b:g", "PARSING_FAILURE"),
+        ("b:e", "BEHAVIOR_TYPE_NOT_SUPPORTED"),
+        ("b:v", "BEHAVIOR_TYPE_NOT_SUPPORTED"),
+        ("b:/bml/head[3]", "PARSING_FAILURE"),
+    }
+    assert len(block.problems) == 5
+    assert not next(p for p in block.problems if p.id == "b:h").dropped
+
+
+def test_translate_elements_names_what_each_element_was_read_as() -> None:
+    root = etree.fromstring(
+        f'<bml xmlns="{CORE}" id="b" character="x"><head id="h" type="NOD"/><wait id="w"/></bml>'
+    )
+    read_as = translate_elements(root)
+    assert {e.get("id"): text for e, text in read_as.items()} == {
+        "b": "read as Greta's BML: <bml character> as characterId",
+        "h": 'read as SmartBody\'s BML: <head type="NOD"> as lexeme=NOD',
+    }
 
 
 def test_translate_keeps_the_lines_of_elements() -> None:
