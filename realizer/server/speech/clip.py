@@ -13,6 +13,7 @@ import numpy as np
 from realizer.core.array_types import Int16
 from realizer.protocol.messages.speech import TimedText
 from realizer.speech.utterance import Phoneme
+from realizer.speech.voice_activity import VoiceActivity
 
 if TYPE_CHECKING:
     from realizer.speech.sound_visemes.recogniser import VisemeRecogniser
@@ -94,6 +95,10 @@ class ArrivingClip:
     sound: bytearray = field(default_factory=bytearray)  # little-endian int16 samples
     taken: int = 0
     count: int = 0
+    activity: VoiceActivity = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.activity = VoiceActivity(self.rate)
 
     @property
     def ready(self) -> int:
@@ -123,6 +128,10 @@ class ArrivingClip:
         phonemes = [(p, min(until, end)) for p, until in spans if p.start < end and until > start]
         phonemes += [(p, p.end) for p in self.phonemes if ends and p.start >= end]
         pcm = samples_of(bytes(self.sound[: 2 * count]))
+        turns = self.activity.add(pcm)
+        begun = self.activity.speaks or bool(turns) or self.activity.loud > 0
+        if not (begun or self.words or self.phonemes):  # noise and hum are pauses
+            phonemes = [(TimedText(start=start, text=""), end)]
         del self.sound[: 2 * count]
         self.taken, self.count = begin + count, self.count + 1
         return (

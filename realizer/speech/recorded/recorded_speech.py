@@ -13,6 +13,7 @@ from realizer.core.array_types import Bool, Float64, Int16
 from realizer.speech.sound_visemes.mel_stream import viseme_facts
 from realizer.speech.sound_visemes.recogniser import recognised
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word, tile
+from realizer.speech.voice_activity import spans_of_voice
 from realizer.tables.phonemes import symbols
 
 # Words of a voice are adjacent, while those of a recording may have gaps: the end of a word is mapped as a
@@ -207,11 +208,28 @@ def _letters(words: Sequence[Word]) -> tuple[Float64, Float64]:
 
 @lru_cache(CACHED)
 def _by_sound(recording: Recording) -> tuple[Phoneme, ...]:
-    """Return the phonemes that are heard; if the sound is no speech, vowels that follow the loudness."""
+    """Return the phonemes that are heard; if the sound is no speech, vowels that follow the loudness.
+
+    Noise and hum are pauses.
+    """
     pcm, rate = recording.pcm, recording.rate
+    spans = spans_of_voice(pcm, rate)
+    if not spans:
+        return ()
     loudness = by_loudness(pcm, rate)
     heard = recognised(pcm, rate) if recording.heard is None else recording.heard
-    return heard if _is_speech(heard, loudness) else loudness
+    return _inside(spans, heard if _is_speech(heard, loudness) else loudness)
+
+
+def _inside(spans: Sequence[tuple[float, float]], phonemes: Sequence[Phoneme]) -> tuple[Phoneme, ...]:
+    """Return phonemes that cover a sound, with pauses outside of some spans of it."""
+    starts = [(0.0, "", 0)]
+    for phoneme in phonemes:
+        for begin, end in spans:
+            if phoneme.ipa and phoneme.start < end and phoneme.end > begin:
+                starts.append((max(phoneme.start, begin), phoneme.ipa, phoneme.stress))
+                starts.append((min(phoneme.end, end), "", 0))
+    return tile(starts, phonemes[-1].end) if phonemes else ()
 
 
 def _is_speech(heard: Sequence[Phoneme], loudness: Sequence[Phoneme]) -> bool:

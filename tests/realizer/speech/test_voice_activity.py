@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.speech.voice_activity import Turn, VoiceActivity
+from realizer.speech.voice_activity import Turn, VoiceActivity, spans_of_voice
 
 RATE = 16_000
 
@@ -70,3 +70,14 @@ def test_voice_activity_ends_a_turn_with_the_sound() -> None:
     assert activity.end() == []
     activity.add(TALK[: 2 * RATE])
     assert activity.end() == [Turn.ENDS]
+
+
+def test_spans_of_voice_are_louder_than_the_background() -> None:
+    heard = sound((1.0, 300), (1.0, 3000), (1.0, 300), (0.02, 3000), (1.0, 300))
+    assert spans_of_voice(heard, RATE) == [(pytest.approx(0.7, abs=0.02), pytest.approx(2.3, abs=0.02))]
+    assert spans_of_voice(sound((2.0, 300)), RATE) == []
+    assert spans_of_voice(sound((2.0, 0)), RATE) == []
+
+
+def test_spans_of_voice_of_a_short_sound_are_all_of_it() -> None:
+    assert spans_of_voice(sound((0.3, 300)), RATE) == [(0.0, 0.3)]

@@ -66,3 +66,15 @@ def test_arriving_clip_adds_what_begins_after_the_sound_to_its_last_part() -> No
     _, words, phonemes = clip.take(500, ends=True)
     assert [(w.start, w.end, w.text) for w in words] == [(0.1, None, "one"), (100, 200, "two")]
     assert [(p.start, p.end, p.text) for p in phonemes] == [(0.1, 0.2, "w"), (100, None, "t")]
+
+
+def test_arriving_clip_of_noise_has_pauses_until_somebody_speaks() -> None:
+    clip = arriving()
+    random = np.random.default_rng(1)
+    kinds = []
+    for level in (50, 50, 5000, 50):
+        clip.sound += np.rint(level * random.standard_normal(400)).astype("<i2").tobytes()
+        _, _, phonemes = clip.take(400)
+        kinds.append([(p.start, p.end, p.text) for p in phonemes])
+    pause = [(0.0, pytest.approx(0.4), "")]
+    assert kinds == [pause, pause, [], []]  # a turn goes on in a short pause

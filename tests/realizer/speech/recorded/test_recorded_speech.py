@@ -14,7 +14,8 @@ from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Word
 
 RATE = 16000
-SOUND = np.rint(8000 * np.sin(np.arange(2 * RATE) * 0.1)).astype(np.int16)
+# After a quarter of a second of silence, without which it would be a hum.
+SOUND = np.rint(8000 * np.sin(np.arange(2 * RATE) * 0.1) * (np.arange(2 * RATE) > RATE / 4)).astype(np.int16)
 TEXT = SpeechRequest('One <mark name="m"/>two, three', ("m",))
 WORDS = (Word(0.2, 0.5, "One"), Word(1.0, 1.3, "two,"), Word(1.3, 1.8, "three"))
 
@@ -79,8 +80,41 @@ def test_utterance_of_sound_alone_uses_what_was_heard() -> None:
 
 def test_utterance_of_sound_that_is_no_speech_uses_loudness() -> None:
     utterance = utterance_of(SpeechRequest(""), Recording(4000, SOUND))  # no consonant has so low a rate
-    assert {p.ipa for p in utterance.phonemes} == {"a"}
+    assert {p.ipa for p in utterance.phonemes} == {"", "a"}
     assert said(SpeechRequest(""), heard=(Phoneme(0.0, 2.0, ""),)).phonemes == by_loudness(SOUND, RATE)
+
+
+def openings(pcm: np.ndarray) -> list[tuple[float, float]]:
+    """Return (start, end) of the phonemes of a sound alone that are no pauses."""
+    recording = Recording(RATE, np.rint(pcm).astype(np.int16))
+    return [(p.start, p.end) for p in utterance_of(SpeechRequest(""), recording).phonemes if p.ipa]
+
+
+NOISE = 300 * np.random.default_rng(1).standard_normal(RATE)
+TIME = np.arange(RATE) / RATE
+HUM = sum(1000 / k * np.sin(2 * np.pi * 50 * k * TIME) for k in range(1, 8))
+
+
+@pytest.mark.parametrize("background", [NOISE / 10, NOISE, 10 * NOISE, HUM, HUM / 30, NOISE + HUM])
+def test_utterance_of_noise_and_hum_keeps_the_mouth_closed(background: np.ndarray) -> None:
+    assert openings(background) == []
+
+
+@pytest.mark.parametrize("background", [NOISE, HUM])
+def test_utterance_of_speech_in_noise_moves_the_mouth_while_it_lasts(background: np.ndarray) -> None:
+    pytest.importorskip("espeakng_loader")
+    voice = find_voice("espeak")
+    spoken = voice.say(SpeechRequest("Bob may buy a map of the town."))
+    voice.close()
+    assert spoken.pcm is not None
+    rate, pcm = spoken.sample_rate, spoken.pcm.astype(float)
+    speech = np.interp(np.arange(0, spoken.duration, 1 / RATE), np.arange(len(pcm)) / rate, pcm)
+    around = np.tile(background, 5)[: len(speech) + 2 * RATE]
+    around[RATE : RATE + len(speech)] += speech
+    spans = openings(around)
+    assert sum(end - start for start, end in spans) > 0.6 * spoken.duration
+    assert min(start for start, _ in spans) > 0.6
+    assert max(end for _, end in spans) < 1.4 + spoken.duration
 
 
 def test_utterance_of_text_without_times_is_aligned() -> None:
