@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from starlette.applications import Starlette
-from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
@@ -26,11 +25,13 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from bml_schema import BMLError
+from bml_schema.encodings import decode
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.http.connections import SOCKETS, session_of
 from realizer.server.http.http_site import FRAMES, JSON
-from realizer.server.http.hub import Hub, address_of
+from realizer.server.http.hub import ENDING, Hub, address_of
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.http.openapi import FINDING, description
 from realizer.server.http.page_tools import MAX_TEXT
@@ -129,6 +130,8 @@ class Guard:
 
         try:
             hub.access.check_host(headers)
+            if hub.sessions.is_ending and scope["type"] == "http" and API.match(path):
+                raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, ENDING)
             await self._app(scope, receive, send_on)
         except ClientDisconnect:
             pass
@@ -227,8 +230,9 @@ async def _realize(hub: Hub, request: Request) -> Response:
     with _faults_of_texts():
         document = document_of(await hub.body(request)).bml
     path = await hub.attend(request, hub.renderings.render(document, query, visitor.address))
-    remove = BackgroundTask(shutil.rmtree, path.parent, ignore_errors=True)
-    return FileResponse(path, media_type=OUTPUTS[path.suffix].media_type, background=remove)
+    entered = contextlib.AsyncExitStack()
+    entered.callback(shutil.rmtree, path.parent, ignore_errors=True)
+    return _Held(FileResponse(path, media_type=OUTPUTS[path.suffix].media_type), entered)
 
 
 async def _check(hub: Hub, request: Request) -> Response:
@@ -253,11 +257,18 @@ async def _send_bml(hub: Hub, request: Request) -> Response:
     visitor, name = hub.admit(request), request.path_params["session"]
     with _faults_of_texts():
         document = document_of(await hub.body(request)).bml
-    text = document.decode("utf-8", "replace") if isinstance(document, bytes) else document
+    text = document if isinstance(document, str) else _text(document)
     async with hub.joined(_Listener(), name, visitor) as number:
         hub.sessions.receive(number, text)
         await hub.sessions.wait_for_room(number)
     return JSONResponse({"session": name}, HTTPStatus.ACCEPTED)
+
+
+def _text(document: bytes) -> str:
+    try:
+        return decode(document)[0]
+    except BMLError:  # the session says what is wrong
+        return document.decode("utf-8", "replace")
 
 
 async def _feedback(hub: Hub, request: Request) -> Response:
@@ -266,26 +277,23 @@ async def _feedback(hub: Hub, request: Request) -> Response:
     visitor = Visitor(address_of(request), grant.sessions)
     seen = request.query_params.get("seen") or request.headers.get("last-event-id")
     _, number = session_of("/" if seen is None else f"/?seen={seen}")
-    joined = hub.joined(listener := _Listener(), name, visitor, number)
-    await joined.__aenter__()  # a refusal is the answer, not an event
+    entered = contextlib.AsyncExitStack()
+    await entered.enter_async_context(hub.joined(listener := _Listener(), name, visitor, number))
 
     async def events() -> AsyncIterator[str]:
-        try:
-            while (left := grant.seconds_left) is None or left:  # as long as the token is valid
-                try:
-                    async with asyncio.timeout(KEEP_ALIVE if left is None else min(left, KEEP_ALIVE)):
-                        message = await listener.messages.get()
-                except TimeoutError:
-                    yield ": nothing new\n\n"
-                    continue
-                if message is None:
-                    return
-                yield event_of(message)
-        finally:
-            await joined.__aexit__(None, None, None)
+        while (left := grant.seconds_left) is None or left:  # as long as the token is valid
+            try:
+                async with asyncio.timeout(KEEP_ALIVE if left is None else min(left, KEEP_ALIVE)):
+                    message = await listener.messages.get()
+            except TimeoutError:
+                yield ": nothing new\n\n"
+                continue
+            if message is None:
+                return
+            yield event_of(message)
 
     headers = {"Cache-Control": "no-cache", "X-Accel-Buffering": "no"}
-    return StreamingResponse(events(), media_type="text/event-stream", headers=headers)
+    return _Held(StreamingResponse(events(), media_type="text/event-stream", headers=headers), entered)
 
 
 async def _end(hub: Hub, request: Request) -> Response:
@@ -331,6 +339,18 @@ def event_of(message: str) -> str:
     seq = SEQ.search(message) if is_feedback else None
     data = "".join(f"data: {line}\n" for line in message.splitlines())
     return f"event: {name}\n{f'id: {seq[1]}' + chr(10) if seq else ''}{data}\n"
+
+
+class _Held(Response):
+    """A response, and what ends when all of it has been sent, or its client has gone."""
+
+    def __init__(self, response: Response, entered: contextlib.AsyncExitStack) -> None:
+        self._response = response
+        self._entered = entered
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async with self._entered:
+            await self._response(scope, receive, send)
 
 
 class _Listener:

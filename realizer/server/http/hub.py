@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 PATIENCE = 30.0  # s; for the body of a request
+ENDING = "the service is ending: try again later"
 GONE = 499  # status for the log: nobody gets an answer
 
 
@@ -182,7 +183,7 @@ class Hub:
                 return working.result()
             if leaving.done():
                 raise JoinError(GONE, "the client has gone")
-            raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, "the service is ending: try again later")
+            raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, ENDING)
         finally:
             for task in (working, leaving, ending):
                 task.cancel()

@@ -110,6 +110,11 @@ class SessionHost(SessionRunner):
                     await asyncio.sleep(DRAIN_STEP)
 
     @property
+    def is_ending(self) -> bool:
+        """Whether documents are refused."""
+        return self._factory.ending
+
+    @property
     def busy(self) -> bool:
         """Whether a block plays, waits or is being prepared."""
         sessions = self._registry.sessions.values()

@@ -16,6 +16,7 @@ from websockets.sync.client import connect
 from realizer.core.settings import Settings, SettingsError
 from realizer.server.http import hub, renderings
 from realizer.server.http.app import create_app
+from realizer.server.serve import Server
 from tests.realizer.server.http.conftest import LIMIT, Served, run_service
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
@@ -116,6 +117,28 @@ def test_hub_cancels_work_when_the_service_ends(endless) -> None:
     answer = connection.getresponse()
     assert (answer.status, answer.headers["Retry-After"]) == (503, "5")
     connection.close()
+
+
+def test_hub_refuses_what_comes_while_the_service_ends() -> None:
+    async def run() -> tuple[int, int]:
+        async with Server(Settings(port=0, voice="silent")) as server:
+            kept = http.client.HTTPConnection("127.0.0.1", server.port, timeout=LIMIT)
+
+            def ask(method: str, path: str) -> int:
+                kept.request(method, path, NOD)
+                answer = kept.getresponse()
+                answer.read()
+                return answer.status
+
+            assert await asyncio.to_thread(ask, "POST", "/check") == 200
+            await server.drain()
+            statuses = [
+                await asyncio.to_thread(ask, *asked) for asked in (("POST", "/check"), ("GET", "/healthz"))
+            ]
+            kept.close()
+            return tuple(statuses)
+
+    assert asyncio.run(run()) == (503, 200)
 
 
 def test_hub_ends_a_stream_of_feedback_with_the_service() -> None:

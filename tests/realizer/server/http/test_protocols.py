@@ -257,6 +257,12 @@ def test_writer_cuts_a_long_reason() -> None:
     between(test)
 
 
+def test_protocol_logs_no_error_for_a_websocket_that_is_refused(caplog: pytest.LogCaptureFixture) -> None:
+    (answer,) = answers(UPGRADE.replace(b"/ws", b"/ws?session=a%20b"))
+    assert answer.startswith(b"HTTP/1.1 400 ")
+    assert not [record for record in caplog.records if record.levelname == "ERROR"]
+
+
 def test_connection_ends_if_its_request_does_not_come(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(protocols, "OPENING", 0.1)
     for part in (b"", b"GET / HT", b"GET /healthz HTTP/1.1\r\nHost: x\r\n"):
