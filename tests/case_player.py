@@ -225,7 +225,7 @@ def sample_faces(player: Player, instants: Iterable[Instant]) -> dict[Instant, d
     for instant in sorted(set(instants), key=lambda i: i.time):
         by_character.setdefault(instant.character, []).append(instant)
     for character, own in by_character.items():
-        index = player.character_index(character) if character else 0
+        index = player.cast.index_of(character) if character else 0
         frames = player.frames(np.array([instant.time for instant in own]), index)
         for instant, aus, values in zip(own, frames.aus, to_fap(frames).values, strict=True):
             face = dict(zip(AU_NAMES(), map(float, aus), strict=True))

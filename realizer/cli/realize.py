@@ -203,7 +203,7 @@ def schedule(
     texts = inputs.read_documents(documents)
     accepted, refused = plan(texts, player, chosen.voice)
     if len(accepted) > 1:  # conflicts of blocks are settled when they start
-        player.advance(inf)
+        player.manager.advance(inf)
     schedules = [player.blocks.latest(planned, whole=True) for planned in accepted]
     if any(speaking.utterance.pcm is None for speaking in player.speech()):
         warn_no_voice(chosen.voice)

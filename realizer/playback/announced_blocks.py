@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
+from typing import NamedTuple
 
 from bml_schema import Block
 from realizer.playback import block_links
@@ -15,11 +16,23 @@ from realizer.scheduling.timing import Warning
 
 
 class BlockRejectedError(Exception):
-    """A block cannot be accepted; the warning has the reason."""
+    """A block cannot be accepted; the warning has the reason, None if it has been reported.
 
-    def __init__(self, warning: Warning) -> None:
-        super().__init__(warning.text)
+    Attributes:
+        over_limit: planning it takes too many steps.
+    """
+
+    def __init__(self, warning: Warning | None, *, over_limit: bool = False) -> None:
+        super().__init__(warning and warning.text)
         self.warning = warning
+        self.over_limit = over_limit
+
+
+class BlockLinks(NamedTuple):
+    """The blocks that a new one waits for, and the accepted ones that have to wait for it."""
+
+    waits: list[Dependency]
+    followers: list[tuple[ActiveBlock, BlockMoment]]
 
 
 @dataclass(eq=False)
@@ -97,13 +110,11 @@ class AnnouncedBlocks:
         waits = block_links.dependencies(block, announced.character, announced.number, active)
         return waits + placed_before
 
-    def links(
-        self, announced: AnnouncedBlock
-    ) -> tuple[list[Dependency], list[tuple[ActiveBlock, BlockMoment]]]:
-        """Return the dependencies of a block, and the accepted blocks that have to wait for it.
+    def links(self, announced: AnnouncedBlock) -> BlockLinks:
+        """Return the links of a block.
 
         Raises:
-            BlockRejectedError: one of the latter has started, or is itself a dependency.
+            BlockRejectedError: a block that has to wait for it has started, or is itself a dependency.
         """
         id_of_block, waits = announced.block.id, self.dependencies(announced)
         waiting: list[tuple[ActiveBlock, BlockMoment]] = []
@@ -117,7 +128,7 @@ class AnnouncedBlocks:
         if waiting and any(id(playing) in block_links.all_dependencies(waits) for playing, _ in waiting):
             text = "prependBefore, chunkBefore: wanted blocks that this one does not wait for itself"
             raise BlockRejectedError(Warning(id_of_block, "IMPOSSIBLE_TO_SCHEDULE", text))
-        return waits, waiting
+        return BlockLinks(waits, waiting)
 
     def unheard(self, announced: AnnouncedBlock) -> Iterator[Warning]:
         """Yield a warning for each attribute of a block that names one of which nothing was heard before."""

@@ -9,11 +9,17 @@ from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, BlockCommand, PlanningContext
 from realizer.core import work
 from realizer.playback.active_block import ActiveBlock, Dependency
-from realizer.playback.announced_blocks import AnnouncedBlock, AnnouncedBlocks, BlockRejectedError
+from realizer.playback.announced_blocks import (
+    AnnouncedBlock,
+    AnnouncedBlocks,
+    BlockLinks,
+    BlockRejectedError,
+)
 from realizer.playback.anticipation import anticipators_of, lead_times
 from realizer.playback.block_commands import CommandError, execute
+from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent, State, next_state
-from realizer.playback.character import Character
+from realizer.playback.character import Cast
 from realizer.playback.feedback_events import (
     Event,
     Phase,
@@ -34,112 +40,128 @@ ANTICIPATORS = 2_000
 class BlockManager:
     """The blocks of one session, and their pending feedback.
 
-    `veto` maps a block and its schedule to the reason why it is refused, or None.
+    Args:
+        kinds: tag -> BehaviourKind, the known behaviours.
+        cast: the characters.
+        veto: (block, its schedule) -> why it is refused, or None.
     """
 
     def __init__(
         self,
         kinds: Mapping[str, BehaviourKind],
+        cast: Cast,
         veto: Callable[[Block, Schedule], str | None] = lambda block, schedule: None,
     ) -> None:
         self.kinds = kinds
+        self._cast = cast
         self._veto = veto
-        self._characters: list[Character] = [Character(None)]
-        self.timeline = BlockTimeline(kinds, self._characters)
+        self.timeline = BlockTimeline(kinds, cast)
         self.blocks = self.timeline.blocks
         self.reports = self.timeline.reports
         self._announced = AnnouncedBlocks(self.blocks)
 
     # blocks in ----------------------------------------------------------------------------------
 
-    def character_index(self, id: str | None) -> int:
-        """Return the index of a character, 0 for None; a new one is added."""
-        if id is None:
-            return 0
-        for index, character in enumerate(self._characters):
-            if character.id == id:
-                return index
-        if self._characters[0].id is None:
-            # The first name in a session is the name of its first face.
-            self._characters[0].id = id
-            return 0
-        self._characters.append(Character(id))
-        return len(self._characters) - 1
-
-    def drop_characters(self, ids: Sequence[str | None]) -> None:
-        """Drop the characters that a former list of ids does not have, and a later name of the first one."""
-        del self._characters[len(ids) :]
-        self._characters[0].id = ids[0]
-
     def announce(self, block: Block, now: float) -> None:
         """Acknowledge a block, once: planning has begun. `accept` does it if it was not done before."""
-        announced = self._announced.add(block, self.character_index(block.character_id))
+        announced = self._announced.add(block, self._cast.index_of(block.character_id))
         if announced is not None:
             start = max([now, *(w.until for w in self._announced.dependencies(announced))])
             self.reports.add(acknowledgement(block, start if start < now + UNKNOWN else now))
 
     def withdraw(self, block: Block, now: float) -> None:
         """Remove an announced block that will not be submitted, and report its end."""
-        character = self.character_index(block.character_id)
+        character = self._cast.index_of(block.character_id)
         announced = self._announced.pop(block.id) or AnnouncedBlock(block, character)
         if not announced.is_revoked:
             self._revoke(announced, now)
 
     def refuse(self, warning: Warning, character: str | None = None) -> None:
+        """Report why something was not accepted."""
         self.reports.warn(warning, character)
 
     def accept(self, block: Block, context: PlanningContext, now: float) -> Schedule:
-        character = self.character_index(block.character_id)
+        """Plan a block, and place it in time among the others; see `Player.submit`."""
         self.advance(now, starts_before=now)
         self.announce(block, now)
-        announced = self._announced.find(block.id)
-        if announced is not None and announced.is_revoked:  # its end has been reported
-            self._announced.pop(block.id)
-            return Schedule(block.id, {}, {}, start=now, failed=True)
-        if announced is None or self._announced.is_in_use(block, character):
-            self._announced.pop(block.id)
-            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
-            in_use = Warning(block.id, "PARSING_FAILURE", text, in_use_for=context.sender)
-            return self._refuse(block, in_use, now)
         try:
-            waits, waiting = self._announced.links(announced)
+            announced = self._find_announced(block, context)
+            character = self._cast.index_of(block.character_id)
+            arrival = Arrival(block, character, announced.number, context)
+            is_preplanned = block.preplan and not announced.activated
+            state = next_state(announced.state, BlockEvent.PREPLAN if is_preplanned else BlockEvent.PLAN)
+            links = self._announced.links(announced)
+            ended = self._announced.blocks_to_end(announced)
+            planned, others = self._plan(arrival, state, links, ended, now)
         except BlockRejectedError as refused:
             self._announced.pop(block.id)
-            return self._refuse(block, refused.warning, now)
-        ended = self._announced.blocks_to_end(announced)
-        pending = block.preplan and not announced.activated
-        start = inf if pending else max([now, *(w.until for w in waits)])
-        arrival = Arrival(block, character, announced.number, context)
-        planned, others = self.timeline.planner.plan(arrival, start, now, waits=waits, ended=ended)
+            return self._refuse(block, refused, now)
         if planned.schedule.lengths:
             return planned.schedule
         self._announced.pop(block.id)
-        if planned.schedule.failed:
-            failed = self._refuse(block, planned.schedule.warnings[0], now)
-            return replace(failed, over_limit=planned.schedule.over_limit)
-        if (words := self._veto(block, planned.schedule)) is not None:
-            return self._refuse(block, Warning(block.id, "CANNOT_CREATE_BEHAVIOR", words), now)
-        if not context.animates:
-            return planned.schedule
-        self._end(ended, announced, now)
-        state = next_state(announced.state, BlockEvent.PREPLAN if pending else BlockEvent.PLAN)
-        playing = ActiveBlock(planned, self.kinds, context, character, announced.number, now, waits, state)
+        if context.animates:
+            self._end(ended, announced, now)
+            playing = self._place(planned, arrival, state, links, now)
+            self._link(playing, links)
+            self._report(playing, announced, now)
+            self._move_others(playing, others, now)
+        return planned.schedule
+
+    def _find_announced(self, block: Block, context: PlanningContext) -> AnnouncedBlock:
+        """Return the announcement of a block that is not revoked and whose id is free."""
+        announced = self._announced.find(block.id)
+        if announced is not None and announced.is_revoked:
+            raise BlockRejectedError(None)  # its end has been reported
+        if announced is None or self._announced.is_in_use(block, self._cast.index_of(block.character_id)):
+            text = f"block id {block.id!r} is still in use: wanted an id of no block that plays or waits"
+            raise BlockRejectedError(Warning(block.id, "PARSING_FAILURE", text, in_use_for=context.sender))
+        return announced
+
+    def _plan(
+        self, arrival: Arrival, state: State, links: BlockLinks, ended: Sequence[ActiveBlock], now: float
+    ) -> tuple[Plan, list[ActiveBlock]]:
+        """Plan a block as `JointPlanner.plan`; it starts when those that it waits for are over."""
+        start = inf if state is State.PENDING else max([now, *(w.until for w in links.waits)])
+        planned, others = self.timeline.planner.plan(arrival, start, now, waits=links.waits, ended=ended)
+        schedule = planned.schedule
+        if schedule.lengths:
+            return planned, others
+        if schedule.failed:
+            raise BlockRejectedError(schedule.warnings[0], over_limit=schedule.over_limit)
+        if (words := self._veto(arrival.block, schedule)) is not None:
+            raise BlockRejectedError(Warning(schedule.block, "CANNOT_CREATE_BEHAVIOR", words))
+        return planned, others
+
+    def _place(
+        self, planned: Plan, arrival: Arrival, state: State, links: BlockLinks, now: float
+    ) -> ActiveBlock:
+        """Put a planned block on the timeline."""
+        _, character, number, context = arrival
+        playing = ActiveBlock(planned, self.kinds, context, character, number, now, links.waits, state)
         playing.apply_plan(planned, playing.earliest, now)  # it may have ended its own dependencies
         self.blocks.add(playing)
         self.timeline.place(playing)
-        if any(wait.block.order > playing.order for wait in waits):
+        return playing
+
+    def _link(self, playing: ActiveBlock, links: BlockLinks) -> None:
+        """Let blocks wait for each other, and report in this order."""
+        if any(wait.block.order > playing.order for wait in links.waits):
             self.timeline.reorder(playing)
-        for follower, moment in ((p, m) for p, m in waiting if not p.is_done):
+        for follower, moment in ((p, m) for p, m in links.followers if not p.is_done):
             follower.add_dependency(Dependency(playing, moment))
             self.timeline.reorder(follower)
         self._announced.place_after(playing)
+
+    def _report(self, playing: ActiveBlock, announced: AnnouncedBlock, now: float) -> None:
         self.timeline.predict(playing, now)
-        for warning in (*planned.schedule.warnings, *self._announced.unheard(announced)):
-            self.reports.warn(warning, block.character_id)
-        self.timeline.retime(others, planned.other_schedules, now)
-        self.timeline.trim(planned.trims, now)
+        for warning in (*playing.schedule.warnings, *self._announced.unheard(announced)):
+            self.reports.warn(warning, playing.block.character_id)
+
+    def _move_others(self, playing: ActiveBlock, others: Sequence[ActiveBlock], now: float) -> None:
+        """Change the times of the blocks that were solved with a new one, and of those that wait for it."""
+        self.timeline.retime(others, playing.plan.other_schedules, now)
+        self.timeline.trim(playing.plan.trims, now)
         self.timeline.update_followers(playing, now)
-        return planned.schedule
 
     # time ---------------------------------------------------------------------------------------
 
@@ -307,7 +329,10 @@ class BlockManager:
         self.timeline.update_speech(playing, behaviour, utterance, now)
         return True
 
-    def _refuse(self, block: Block, warning: Warning, now: float) -> Schedule:
-        self.reports.warn(warning, block.character_id)
+    def _refuse(self, block: Block, refused: BlockRejectedError, now: float) -> Schedule:
+        failed = Schedule(block.id, {}, {}, start=now, failed=True, over_limit=refused.over_limit)
+        if refused.warning is None:
+            return failed
+        self.reports.warn(refused.warning, block.character_id)
         self.blocks.note_revoked(block.id)
-        return Schedule(block.id, {}, {}, start=now, warnings=(warning,), failed=True)
+        return replace(failed, warnings=(refused.warning,))

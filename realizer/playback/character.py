@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -99,6 +99,32 @@ class Character:
         self.direct = {n: c for n, c in self.direct.items() if c.faded_at > before}
         self.emotion = {n: c for n, c in self.emotion.items() if c.faded_at > before}
         self.responses = [c for c in self.responses if c.span[1] > before]
+
+
+class Cast(list[Character]):
+    """The characters of a session; the first one is meant where a document names none."""
+
+    def __init__(self) -> None:
+        super().__init__([Character(None)])
+
+    @property
+    def ids(self) -> list[str | None]:
+        return [character.id for character in self]
+
+    def index_of(self, id: str | None) -> int:
+        """Return the index of a character, 0 for None; a new one is added."""
+        if id is None:
+            return 0
+        if id not in self.ids and self[0].id is None:
+            self[0].id = id  # the first name in a session is the name of its first face
+        elif id not in self.ids:
+            self.append(Character(id))
+        return self.ids.index(id)
+
+    def drop_new(self, ids: Sequence[str | None]) -> None:
+        """Drop the characters that a former list of ids does not have, and a later name of the first one."""
+        del self[len(ids) :]
+        self[0].id = ids[0]
 
 
 def _hold(

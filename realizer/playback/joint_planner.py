@@ -1,8 +1,9 @@
 """The planner of blocks beside the active ones, which are solved together with those they are linked to."""
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
+from typing import NamedTuple
 
 from bml_schema import Block
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
@@ -18,8 +19,7 @@ from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule
 
 
-@dataclass(frozen=True)
-class Arrival:
+class Arrival(NamedTuple):
     """A block to be planned, the index of its character, and its number by order of arrival."""
 
     block: Block

@@ -21,10 +21,10 @@ from realizer.core.options import DEFAULTS, PlayOptions
 from realizer.expressions.library import library_of
 from realizer.playback.block_manager import BlockManager
 from realizer.playback.block_states import BlockEvent, State, next_state
-from realizer.playback.character import RELAX, Character
+from realizer.playback.character import RELAX, Cast, Character
 from realizer.playback.face_motion import SEED_STEP, FaceMotion
 from realizer.playback.scheduled_speech import ScheduledSpeech
-from realizer.scheduling.timing import UNKNOWN, Schedule
+from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance
 from realizer.tables.cooccurrence import Rules
 
@@ -32,7 +32,7 @@ from realizer.tables.cooccurrence import Rules
 HISTORY = 1.0  # s
 
 
-class Player(BlockManager):
+class Player:
     """The blocks of one session and their animation.
 
     Args:
@@ -45,6 +45,8 @@ class Player(BlockManager):
         animates: False if blocks are only scheduled, and nothing is played.
 
     Attributes:
+        manager: of its blocks; it has the commands to them that are not here.
+        cast: the characters.
         blocks: the blocks, for reading only.
     """
 
@@ -61,7 +63,11 @@ class Player(BlockManager):
     ) -> None:
         if not isinstance(options, PlayOptions):
             raise TypeError(f"options: wanted PlayOptions, got {options!r}")
-        super().__init__(kinds, veto)
+        self.kinds = kinds
+        self.cast = Cast()
+        self.manager = BlockManager(kinds, self.cast, veto)
+        self.blocks = self.manager.blocks
+        self._timeline = self.manager.timeline
         self._face_inputs = face_inputs
         self.context = PlanningContext(
             scene=options.scene,
@@ -77,14 +83,14 @@ class Player(BlockManager):
             liveliness=options.liveliness if options.idle else 0.0,
             animates=animates,
         )
-        self._faces = FaceMotion(options, self.blocks, self._characters)
+        self._faces = FaceMotion(options, self.blocks, self.cast)
         self.strict_bml = options.strict_bml
         self.history = history
 
     @property
     def version(self) -> int:
         """Increases whenever frames change that may have been computed before."""
-        return self.timeline.version
+        return self._timeline.version
 
     # documents ----------------------------------------------------------------------------------
 
@@ -128,17 +134,33 @@ class Player(BlockManager):
             block fits with other utterances: submit it again with utterances of these lengths
             (`speech.duration_fit`), or with the same ones with a `stretch` of (1, 1).
         """
-        character = self.character_index(block.character_id)
+        character = self.cast.index_of(block.character_id)
         takes = (
             self.context.face_inputs if self._face_inputs is None else partial(self._face_inputs, character)
         )
         world = replace(self.context, utterances=dict(utterances or {}), face_inputs=takes, sender=sender)
-        return self.accept(block, world, now)
+        return self.manager.accept(block, world, now)
+
+    def announce(self, block: Block, now: float) -> None:
+        """Acknowledge a block, once: planning has begun. `submit` does it if it was not done before."""
+        self.manager.announce(block, now)
+
+    def refuse(self, warning: Warning, character: str | None = None) -> None:
+        """Report why something was not accepted."""
+        self.manager.refuse(warning, character)
+
+    def stop(self, now: float, block_ids: Iterable[str] | None = None) -> list[str]:
+        """End blocks, or all; return their ids. Sound fades, the face relaxes to its base without a jump."""
+        return self.manager.stop(now, block_ids)
+
+    def anticipate(self, id: str, syncs: Mapping[str, float], now: float) -> None:
+        """Set the expected times of the points `anticipators:id:sync`, as `BlockManager.anticipate`."""
+        self.manager.anticipate(id, syncs, now)
 
     def clear(self) -> None:
         """Forget all blocks; a player that is not used any more would leave them to the garbage collector."""
         self.blocks.clear()
-        self.timeline.events.clear()
+        self._timeline.events.clear()
 
     def set_scene(self, scene: Mapping[str, Position] | None) -> None:
         """Set the positions of targets for documents that are planned from now on."""
@@ -150,8 +172,8 @@ class Player(BlockManager):
         Raises:
             KeyError: no such AU or FAP.
         """
-        self._characters[character].set_direct(values, now)
-        self.timeline.mark_changed()
+        self.cast[character].set_direct(values, now)
+        self._timeline.mark_changed()
 
     def hear(self, now: float, *, is_speaking: bool, text: str | None = None, character: int = 0) -> None:
         """Add the responses of a character to what another one says; it listens while the other still speaks.
@@ -160,10 +182,10 @@ class Player(BlockManager):
         """
         from realizer.behaviours.listen import responses  # few characters listen
 
-        own = self._characters[character]
+        own = self.cast[character]
         context = replace(self.context, seed=self.context.seed + SEED_STEP * character)
         own.responses = responses(own.responses, now, context, is_speaking=is_speaking, text=text)
-        self.timeline.mark_changed()
+        self._timeline.mark_changed()
 
     def hear_sound(
         self, sound: Int16, rate: int, now: float, *, is_last: bool = False, character: int = 0
@@ -176,7 +198,7 @@ class Player(BlockManager):
         """
         from realizer.speech.voice_activity import Turn, VoiceActivity
 
-        own = self._characters[character]
+        own = self.cast[character]
         if own.heard is None or own.heard.rate != rate:
             own.heard = VoiceActivity(rate)
         turns = [*own.heard.add(sound), *(own.heard.end() if is_last else ())]
@@ -188,7 +210,7 @@ class Player(BlockManager):
 
     def direct_names(self, character: int = 0) -> tuple[str, ...]:
         """Return the names of the AUs and FAPs that are held directly, or have just been released."""
-        return tuple(self._characters[character].direct)
+        return tuple(self.cast[character].direct)
 
     def set_emotion(self, values: Mapping[str, float], now: float, character: int = 0) -> None:
         """Hold an emotion, as AUs (0..1) and FAPs (FAPU) by name, instead of the previous one; {} for none.
@@ -199,8 +221,8 @@ class Player(BlockManager):
         Raises:
             KeyError: no such AU or FAP.
         """
-        self._characters[character].set_emotion(values, now)
-        self.timeline.mark_changed()
+        self.cast[character].set_emotion(values, now)
+        self._timeline.mark_changed()
 
     # feedback -----------------------------------------------------------------------------------
 
@@ -210,14 +232,14 @@ class Player(BlockManager):
         Blocks that start at `starts_before` or later do not start yet.
         """
         forgettable = now - self.history - RELAX - AFTERMATH
-        if not (self.next_event <= now or self.blocks.first_invisible < forgettable or self.reports):
+        if not (self.next_event <= now or self.blocks.first_invisible < forgettable or self.manager.reports):
             return []
-        self.advance(now, starts_before)
-        out = self.reports.take_all()
+        self.manager.advance(now, starts_before)
+        out = self.manager.reports.take_all()
         if forgotten := self.blocks.forget(forgettable):
             for playing in forgotten:
-                self.timeline.events.drop(playing)
-            for index, character in enumerate(self._characters):
+                self._timeline.events.drop(playing)
+            for index, character in enumerate(self.cast):
                 # The mood at the start of a speech shows in the motion of the head until its end.
                 spoken = (s.start for p in self.blocks.of_character(index) for s in p.speech.values())
                 character.forget(min([now, *spoken]) - self.history)
@@ -226,8 +248,12 @@ class Player(BlockManager):
     @property
     def next_event(self) -> float:
         """The time of the next event of a block, which may change frames after it; infinite for never."""
-        due = self.timeline.events.next
+        due = self._timeline.events.next
         return float("inf") if due is None else due
+
+    def next_deadline(self) -> float | None:
+        """Return when `due` next returns something; None if nothing plays or waits; past for at once."""
+        return self.manager.next_deadline()
 
     def next_change(self) -> float:
         """Return when `due` will next report or forget something; infinite for never."""
@@ -237,23 +263,18 @@ class Player(BlockManager):
 
     # state --------------------------------------------------------------------------------------
 
-    @property
-    def character_states(self) -> tuple[Character, ...]:
-        """The characters themselves, for reading only."""
-        return tuple(self._characters)
-
     def restore(self, characters: Iterable[Character], past: Iterable[Schedule], expected: Schedule) -> None:
         """Restore the state of another player that was idle; `past`, `expected`: as of `blocks.snapshot`."""
-        self._characters[:] = characters
+        self.cast[:] = characters
         self.blocks.restore(past, expected)
-        self.timeline.mark_changed()
+        self._timeline.mark_changed()
 
     # frames -------------------------------------------------------------------------------------
 
     @property
     def characters(self) -> list[str | None]:
         """Ids of the characters; the first is the default of documents without characterId."""
-        return [c.id for c in self._characters]
+        return self.cast.ids
 
     @property
     def rules(self) -> Rules | None:
@@ -302,5 +323,5 @@ class Player(BlockManager):
                 blocks[-1] |= {"start": p.start, "end": end}
                 spans = ((b, t + p.start) for b, t in p.schedule.times.items() if len(t))
                 blocks[-1]["behaviours"] = [b for b, t in spans if t[0] <= now < t[-1]]
-        faces = [self._faces.state(now, index) for index in range(len(self._characters))]
+        faces = [self._faces.state(now, index) for index in range(len(self.cast))]
         return {"time": now, "blocks": blocks, "characters": faces}

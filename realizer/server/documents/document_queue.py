@@ -114,8 +114,8 @@ class Submission:
         self.voices: dict[int, str] = {}  # index of a character -> name of its voice
         self.counts = Counter[str]()
         self.pending = PendingBlocks()
-        self.speeches = SpeechStreams(player)
-        self.tts = TtsRequests(player, self.pending)
+        self.speeches = SpeechStreams(player.manager)
+        self.tts = TtsRequests(player.manager, self.pending)
         self.queue = DocumentQueue(settings)
         self._name = name
         self._settings = settings
@@ -206,7 +206,7 @@ class Submission:
         try:
             block = self.speeches.with_links(block)
             requests = self._player.speech_requests(block)
-            character = self._player.character_index(block.character_id)
+            character = self._player.cast.index_of(block.character_id)
             pending = PendingBlock(
                 block, character, t, message, self._player.resources, is_incomplete=self.speeches.awaits_sync
             )
@@ -279,7 +279,7 @@ class Submission:
     def withdraw(self, blocks: list[PendingBlock], t: float) -> None:
         """Remove blocks that are not planned yet."""
         for pending in blocks:
-            self._player.withdraw(pending.block, t)
+            self._player.manager.withdraw(pending.block, t)
             self.speeches.on_refused(pending.block.id)
         self.pending.remove(blocks)
 

@@ -13,7 +13,7 @@ from functools import cached_property
 from bml_schema import Block, ParameterValueChange
 from realizer.core import work
 from realizer.core.errors import RealizerError, VoiceError
-from realizer.playback.player import Player
+from realizer.playback.block_manager import BlockManager
 from realizer.playback.references import references
 from realizer.scheduling.timing import Warning
 from realizer.server.session.effects import Speak
@@ -166,10 +166,10 @@ class _Request:
 class TtsRequests:
     """The requests of a session to voices."""
 
-    def __init__(self, player: Player, pending: PendingBlocks) -> None:
+    def __init__(self, manager: BlockManager, pending: PendingBlocks) -> None:
         self.fault: str | None = None  # why a voice failed last; None if none did
         self.request_count = 0  # how many requests were made; the id of the last one
-        self._player = player
+        self._manager = manager
         self._pending = pending
         self._requests: dict[int, _Request] = {}
 
@@ -258,7 +258,7 @@ class TtsRequests:
             pending.utterances[behaviour] = request.utterance = long_text.add_part(part)
             return True
         block = pending.block.id
-        playing = self._player.blocks.find(block)
+        playing = self._manager.blocks.find(block)
         if playing is None or playing.context.utterances.get(behaviour) is not before:
             return False
         times = playing.schedule.times.get(behaviour)
@@ -267,12 +267,12 @@ class TtsRequests:
         elapsed = t - playing.start - float(times[0])
         is_late = elapsed > long_text.ready_until - SOON
         request.utterance = long_text.add_part(part, elapsed + SOON if is_late else 0.0)
-        if not self._player.update_speech_timing(block, behaviour, request.utterance, t):
+        if not self._manager.update_speech_timing(block, behaviour, request.utterance, t):
             return False
         # The warnings of earlier parts have been published.
         for fault in request.utterance.warnings[len(before.warnings) :]:
             warning = Warning(f"{block}:{behaviour}", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED", f"speech: {fault}")
-            self._player.refuse(warning, playing.block.character_id)
+            self._manager.refuse(warning, playing.block.character_id)
         return True
 
 

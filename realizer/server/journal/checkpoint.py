@@ -37,7 +37,7 @@ class Checkpoint:
 
     def is_possible(self, ended_by: float) -> bool:
         """Return whether nothing plays or is prepared; see `Player.is_idle`."""
-        return self.submission.is_idle and self.player.is_idle(ended_by)
+        return self.submission.is_idle and self.player.manager.is_idle(ended_by)
 
     def write(self, at: float, connections: Collection[int]) -> dict[str, str | None]:
         """Return the parts that a journal stores."""
@@ -50,7 +50,7 @@ class Checkpoint:
             "seq": self.feedback_log.newest,
             "told": self.feedback_log.last(),
             "scene": None if scene is None else {name: list(place) for name, place in scene.items()},
-            "characters": [character_to_json(character) for character in player.character_states],
+            "characters": [character_to_json(character) for character in player.cast],
             "faces": {str(index): face for index, face in self.faces.assigned.items()},
             "voices": {str(index): voice for index, voice in self.submission.voices.items()},
             "past": [schedule_to_json(schedule) for schedule in past],

@@ -55,7 +55,7 @@ class ReplayViewer:
     def idle_from(self) -> float:
         """Seconds on the session clock from which only idle motion is left."""
         ends = [block.invisible_after for block in self.blocks if block.end < math.inf]
-        for character in self._session.player.character_states:
+        for character in self._session.player.cast:
             for channel in (*character.direct.values(), *character.emotion.values()):
                 ends.append(float(channel.times[-1]) if channel.faded_at == math.inf else channel.faded_at)
             ends += [shift.end for shift in character.shifts]

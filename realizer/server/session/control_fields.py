@@ -7,7 +7,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.behaviours import emotion
 from realizer.behaviours.kind import PlanningContext
 from realizer.core.errors import RealizerError
-from realizer.playback.player import Player
+from realizer.playback.character import Cast
 from realizer.protocol.messages.requests import EmotionFields, SetMessage
 from realizer.server.documents.limits import MAX_CHARACTERS
 from realizer.tables import faps
@@ -21,16 +21,15 @@ class FieldError(RealizerError):
         self.where = where
 
 
-def character_index(player: Player, character: str | None) -> int:
+def character_index(cast: Cast, character: str | None) -> int:
     """Return the index of a character of the session, which is added if it is new.
 
     Raises:
         FieldError: the session has too many characters.
     """
-    known = player.characters
-    if character not in (None, *known) and len(known) >= MAX_CHARACTERS:
+    if character not in (None, *cast.ids) and len(cast) >= MAX_CHARACTERS:
         raise FieldError("character", f"wanted at most {MAX_CHARACTERS} characters in a session")
-    return player.character_index(character)
+    return cast.index_of(character)
 
 
 def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, float | None]:

@@ -55,7 +55,7 @@ class ControlHandlers:
             answer = _error("voice", error, f"{message.type}.voice")
         except PluginError as error:
             answer = _error("unsupported", error, message.type)
-        self.player.drop_characters(characters)
+        self.player.cast.drop_new(characters)
         self.reply(connection.id, answer)
 
     def _handle(self, connection: Connection, message: requests.Control, t: float) -> None:
@@ -73,7 +73,7 @@ class ControlHandlers:
             case requests.SetMessage():
                 self._set(message, t)
             case requests.Heard(speaking=speaking, text=text):
-                index = character_index(self.player, message.character)
+                index = character_index(self.player.cast, message.character)
                 self.player.hear(t, is_speaking=speaking, text=text, character=index)
             case requests.Anticipate():
                 self.player.anticipate(message.id, message.syncs, t)
@@ -135,7 +135,7 @@ class ControlHandlers:
 
     def _hear(self, piece: ClipPiece, t: float) -> None:
         sound = heard_samples(piece)
-        index = character_index(self.player, piece.id.removeprefix(HEARD) or None)
+        index = character_index(self.player.cast, piece.id.removeprefix(HEARD) or None)
         self.player.hear_sound(sound, piece.rate, t, is_last=piece.final, character=index)
 
     def _stop(self, message: requests.Stop, t: float) -> None:
@@ -163,7 +163,7 @@ class ControlHandlers:
         if message.id is not None:
             if message.clip is not None:
                 self.clips.check(message, annotates=annotates)
-            character_index(self.player, message.character)
+            character_index(self.player.cast, message.character)
             self.submission.speeches.check(message)
         if annotates:
             self.clips.annotate(message)
@@ -180,7 +180,7 @@ class ControlHandlers:
             from realizer.speech.registry import find_voice
 
             find_voice(message.voice).close()  # report an unknown voice now, not with the next speech
-        index = character_index(self.player, message.id)
+        index = character_index(self.player.cast, message.id)
         if message.face is not None:
             self.faces.assigned[index] = message.face
             self.subscriptions.announce_face_change(index)
@@ -188,7 +188,7 @@ class ControlHandlers:
             self.submission.voices[index] = message.voice
 
     def _set(self, message: requests.SetMessage, t: float) -> None:
-        index = character_index(self.player, message.character)
+        index = character_index(self.player.cast, message.character)
         values = direct_values(message, self.player.direct_names(index))
         if "emotion" in message.model_fields_set:
             self.player.set_emotion(emotion_values(message.emotion), t, index)

@@ -97,9 +97,9 @@ class Session:
         checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
         self.journal = SessionJournal(id, checkpoint, self.connections, self.hand_over)
         self.subscriptions = Subscriptions(
-            settings, self.player, self.faces, self.broadcast, self.connections
+            settings, self.player.cast, self.faces, self.broadcast, self.connections
         )
-        self.tracked = TrackedFaces(self.player, self.connections, self._handle)
+        self.tracked = TrackedFaces(self.player.cast, self.connections, self._handle)
         self.queries = QueryHandlers(
             id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
         )

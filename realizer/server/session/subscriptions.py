@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from realizer.core.settings import Settings, limit_hint
-from realizer.playback.player import Player
+from realizer.playback.character import Cast
 from realizer.protocol.messages.common import PICTURES
 from realizer.protocol.messages.replies import ErrorMessage, FaceChanged, Subscribed
 from realizer.protocol.messages.requests import Subscribe, Unsubscribe
@@ -37,7 +37,7 @@ class Subscriptions:
     """The subscriptions of a session's connections to its streams."""
 
     settings: Settings
-    player: Player
+    cast: Cast
     faces: CharacterFaces
     broadcast: Broadcast
     connections: Connections
@@ -61,7 +61,7 @@ class Subscriptions:
             connection.feedback = FeedbackFilter(elements, message.character)
             fields = {"elements": message.elements}
         else:
-            index = character_index(self.player, message.character)
+            index = character_index(self.cast, message.character)
             key = self._key(message)
             old = connection.subscriptions.get(key)
             if stream == "schedule":
@@ -193,7 +193,7 @@ class Subscriptions:
         views.
         """
         stream, character = message.stream, message.character
-        if stream not in ("audio", "schedule") and character == self.player.characters[0]:
+        if stream not in ("audio", "schedule") and character == self.cast[0].id:
             character = None
         return stream, character, message.view if stream == "video" else None
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from realizer.core.errors import PluginError, RealizerError
 from realizer.core.registry import Registry
-from realizer.playback.player import Player
+from realizer.playback.character import Cast
 from realizer.protocol.messages.replies import ErrorMessage, Tracked
 from realizer.protocol.messages.requests import Track
 from realizer.protocol.streams import STREAMS
@@ -53,7 +53,7 @@ class TrackedFaces:
         show: handles a message of a connection, as if a client had sent it.
     """
 
-    player: Player
+    cast: Cast
     connections: Connections
     show: Callable[[int, str, float], object]
     cameras: dict[int, _Camera] = field(default_factory=dict)  # by connection
@@ -67,7 +67,7 @@ class TrackedFaces:
         """
         self.cameras.pop(connection, None)
         if message.fps:
-            character_index(self.player, message.character)
+            character_index(self.cast, message.character)
             if not TRACKERS:
                 raise PluginError("no tracker of faces is installed (group realizer.trackers)")
             make = TRACKERS[next(iter(TRACKERS))]

@@ -7,7 +7,7 @@ from itertools import chain
 
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.core.similar import similar
-from realizer.playback.player import Player
+from realizer.playback.block_manager import BlockManager
 from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
 from realizer.scheduling.timing import UNKNOWN, Warning
@@ -37,8 +37,8 @@ class SpeechStreams:
     like any block. Chunk k is block `ID.k` and starts when the speech of the previous one has ended.
     """
 
-    def __init__(self, player: Player) -> None:
-        self._player = player
+    def __init__(self, manager: BlockManager) -> None:
+        self._manager = manager
         self._speeches: dict[str, SpeechStream] = {}
 
     def __len__(self) -> int:
@@ -126,7 +126,7 @@ class SpeechStreams:
         speech.add_parts(clip, parts, is_last=is_last)
         if fault is not None:
             warning = Warning(f"{speech.id}:{speech.id}", "CANNOT_CREATE_BEHAVIOR", f"speech: {fault}")
-            self._player.refuse(warning, speech.chunk.character)
+            self._manager.refuse(warning, speech.chunk.character)
 
     def on_disconnect(self, connection: int) -> None:
         """Close the speeches of a connection that has left; the rest of their text is spoken."""
@@ -170,7 +170,7 @@ class SpeechStreams:
                 block = replace(block, interrupt=tuple(dict.fromkeys(chain(block.interrupt, *cut))))
             has_syncs = bool(self._speeches) and any(map(self._is_speech_sync, references(block)))
             return with_references(block, self._chunk_reference) if has_syncs else block
-        own = self._player.blocks.find(speech.id)
+        own = self._manager.blocks.find(speech.id)
         waits = own.dependencies if own is not None and own.is_waiting else ()
         return replace(
             block,
@@ -243,11 +243,11 @@ class SpeechStreams:
             if speech.is_finished:
                 continue
             # Until its own block is placed, its start is unknown, and it must not end before that.
-            placed = self._player.blocks.find(speech.id) is not None
+            placed = self._manager.blocks.find(speech.id) is not None
             if not (speech.is_closed and placed) or speech.unplanned or speech.unspoken:
                 end = t + OPEN if speech.end < t + OPEN / 2 else speech.end
             else:
-                last = (self._player.blocks.find(id) for id in speech.scheduled)
+                last = (self._manager.blocks.find(id) for id in speech.scheduled)
                 end = max([speech.last_end, *(chunk.end for chunk in last if chunk is not None)]) + BEHIND
                 end = max(t, end)
             if abs(end - speech.end) > SAME:
@@ -270,10 +270,10 @@ class SpeechStreams:
         if not speech.is_announced:
             return True
         chunks = speech.open_chunks
-        begun = [p for p in map(self._player.blocks.find, chunks) if p is not None and p.has_begun]
+        begun = [p for p in map(self._manager.blocks.find, chunks) if p is not None and p.has_begun]
         ahead = len(chunks) - len(begun[1:])  # what was spoken before the last one that has begun may go on
         ready = speech.has_piece and ahead < AHEAD and len(chunks) < OPEN_CHUNKS
-        return ready and self._player.blocks.find(speech.id) is not None
+        return ready and self._manager.blocks.find(speech.id) is not None
 
     def _is_speech_sync(self, ref: SyncRef) -> bool:
         """Whether a reference is to a sync in the text of a speech: `ID:ID:m`."""
@@ -290,14 +290,14 @@ class SpeechStreams:
         return replace(ref, block=speech.marks[sync]) if sync in speech.marks else ref
 
     def _forget(self, id: str) -> None:
-        self._player.blocks.drop_anticipators([self._speeches.pop(id).anticipator])
+        self._manager.blocks.drop_anticipators([self._speeches.pop(id).anticipator])
 
     def _anticipate(self, speech: SpeechStream, end: float, t: float) -> None:
         speech.end = end
-        self._player.anticipate(speech.anticipator, {"end": end}, t)
+        self._manager.anticipate(speech.anticipator, {"end": end}, t)
 
     def _words(self, chunk: str, t: float) -> list[str]:
-        playing = next((p for p in reversed(self._player.blocks.all()) if p.block.id == chunk), None)
+        playing = next((p for p in reversed(self._manager.blocks.all()) if p.block.id == chunk), None)
         if playing is None:
             return []
         spoken = playing.words_spoken(t)

@@ -404,7 +404,7 @@ def test_update_speech_moves_the_rest_with_a_slower_voice() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(0.5)
-    assert stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 0.5)
+    assert stage.player.manager.update_speech_timing("a", "s", spoken(1.6, 3.0), 0.5)
     times = stage.times()
     assert times["a:s:m"] == times["a:n:stroke"] == pytest.approx(1.6)
     assert times["a:s:end"] == pytest.approx(3.0)
@@ -414,7 +414,7 @@ def test_update_speech_leaves_reported_marks() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(1.2)
-    assert stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 1.2)
+    assert stage.player.manager.update_speech_timing("a", "s", spoken(1.6, 3.0), 1.2)
     times = stage.times()
     assert times["a:s:m"] == pytest.approx(1.0)
     assert times["a:s:end"] == pytest.approx(3.0)
@@ -424,8 +424,8 @@ def test_update_speech_of_a_past_speech_does_nothing() -> None:
     stage = Stage()
     stage.player.submit(stage.block("a", TALK), 0.0, {"s": spoken(1.0, 2.0)})
     stage.until(9.0)
-    assert not stage.player.update_speech_timing("a", "s", spoken(1.6, 3.0), 9.0)
-    assert not stage.player.update_speech_timing("nobody", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.manager.update_speech_timing("a", "s", spoken(1.6, 3.0), 9.0)
+    assert not stage.player.manager.update_speech_timing("nobody", "s", spoken(1.6, 3.0), 9.0)
 
 
 def test_replanning_for_a_failed_block_moves_nothing(stage: Stage) -> None:

@@ -88,7 +88,7 @@ def test_every_row_happens_to_blocks_of_a_player(monkeypatch: pytest.MonkeyPatch
         if stopped is not None:
             player.stop(stopped)
         player.due(9.0)
-    Player().withdraw(block(), 0.0)
+    Player().manager.withdraw(block(), 0.0)
     for waiting in (block(), block(PREPLANNED)):
         player = Player()
         player.submit(waiting, 0.0)

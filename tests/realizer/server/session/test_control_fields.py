@@ -59,9 +59,14 @@ def test_emotion_values_are_the_aus_of_an_emotion() -> None:
 
 def test_character_index_adds_characters_up_to_the_limit(drive) -> None:
     session = drive().session
-    assert [character_index(session.player, name) for name in (None, "Ada", "Ben", "Ada")] == [0, 0, 1, 0]
+    assert [character_index(session.player.cast, name) for name in (None, "Ada", "Ben", "Ada")] == [
+        0,
+        0,
+        1,
+        0,
+    ]
     for number in range(2, MAX_CHARACTERS):
-        assert character_index(session.player, f"c{number}") == number
+        assert character_index(session.player.cast, f"c{number}") == number
     with pytest.raises(FieldError, match="wanted at most 16 characters"):
-        character_index(session.player, "one more")
-    assert character_index(session.player, "Ben") == 1
+        character_index(session.player.cast, "one more")
+    assert character_index(session.player.cast, "Ben") == 1
