@@ -15,6 +15,7 @@ from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, clai
 from realizer.behaviours.pose_channels import express
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
+from realizer.tables.lexemes import face_lexemes
 
 Part: TypeAlias = FaceLexeme | FaceFacs
 
@@ -29,7 +30,10 @@ def timing(node: FaceLexeme | Expression, context: PlanningContext) -> Timing:
 
 
 def expand_part(node: Part, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
-    """Return channels: (1 + overshoot) amount at attackPeak, then amount to relax."""
+    """Return channels: (1 + overshoot) amount at attackPeak, then amount to relax, or again and again."""
+    known = face_lexemes().get(node.lexeme.upper()) if isinstance(node, FaceLexeme) else None
+    if known is not None and known.repeats > 1:
+        return _again_and_again(_targets(node, context), times, known.repeats, node.id)
     curves = {t: {node.overshoot: v} for t, v in _targets(node, context).items()}
     channels = _rise_and_fall(curves, times, node.id)
     return express(channels, context) if isinstance(node, FaceLexeme) else channels
@@ -75,6 +79,16 @@ def _rise_and_fall(
                 keys, values = times, np.array([0.0, highest, value, 0.0])
             channels.append(Channel(target, keys, values, source=source))
     return tuple(channels)
+
+
+def _again_and_again(
+    values: Mapping[Target, float], times: Float64, count: int, source: str
+) -> tuple[Channel, ...]:
+    """Return channels that reach their values `count` times from attackPeak to relax, and are 0 between."""
+    start, peak, relax, end = times.tolist()
+    keys = np.array([start, *np.linspace(peak, relax, 2 * count - 1), end])
+    heights = np.array([0.0, *([1.0, 0.0] * count)])
+    return tuple(Channel(target, keys, value * heights, source=source) for target, value in values.items())
 
 
 def _targets(node: Part, context: PlanningContext) -> dict[Target, float]:

@@ -17,11 +17,12 @@ SIDES = {"": "BOTH", "L": "LEFT", "R": "RIGHT"}
 class FaceLexeme:
     """A facial expression: (AU, side LEFT | RIGHT | BOTH) -> intensity at amount 1.
 
-    An intensity above 1 is reached at a smaller amount.
+    An intensity above 1 is reached at a smaller amount, and all of them `repeats` times.
     """
 
     name: str
     aus: Mapping[tuple[int, str], float]
+    repeats: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,9 @@ class HeadLexeme:
 def face_lexemes() -> Mapping[str, FaceLexeme]:
     """Return upper-case name -> lexeme."""
     return {
-        name: FaceLexeme(name, read_aus(row["aus"], f"{FILE}, face.{name}", most=2.0))
+        name: FaceLexeme(
+            name, read_aus(row["aus"], f"{FILE}, face.{name}", most=2.0), int(row.get("repeats", 1))
+        )
         for name, row in _rows("face").items()
     }
 

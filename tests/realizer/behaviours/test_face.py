@@ -199,3 +199,10 @@ def test_blink_takes_the_time_of_a_blink(play) -> None:
 def test_blink_of_a_smaller_amount_is_partial(play) -> None:
     played = play('<own:blink id="k" amount="0.5" start="0" attackPeak="0.1" relax="0.3" end="0.5"/>')
     assert played.aus(0.2) == {"45L": 0.5, "45R": 0.5}
+
+
+def test_face_repeated_blink_closes_the_eyes_three_times() -> None:
+    times = np.arange(0, 2, 0.01)
+    blinks = expand('<faceLexeme id="x" lexeme="repeated_blink" amount="1"/>', (0.0, 0.1, 1.0, 1.2))
+    shut = np.array(at(blinks, "45L", *times)) > 0.5
+    assert (np.diff(shut.astype(int)) == 1).sum() == 3

@@ -1,5 +1,7 @@
 """Tests of `realizer.tables.lexemes`."""
 
+import re
+
 import pytest
 
 from realizer.core.errors import TableError
@@ -29,7 +31,7 @@ def test_face_lexemes_have_joy_as_happiness() -> None:
     assert known["JOY"].aus == known["HAPPINESS"].aus
 
 
-@each_row("name", sorted(face_lexemes()))
+@each_row("name", sorted(name for name in face_lexemes() if re.search("LEFT|RIGHT", name)))
 def test_face_lexemes_of_one_side_mirror_those_of_the_other(name: str) -> None:
     swapped = {"LEFT": "RIGHT", "RIGHT": "LEFT", "BOTH": "BOTH"}
     swap = name.replace("LEFT", "?").replace("RIGHT", "LEFT").replace("?", "RIGHT")
