@@ -11,6 +11,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import xml_parser
+from bml_schema.dialects.intentions import FML_WRAPPER, fml_of
 from bml_schema.dialects.recognition import has_words_of_dialects, is_draft
 from bml_schema.document_splitter import (
     NEXT,
@@ -148,6 +149,8 @@ def read(
     data, wrapper, roots = _parse_at_once(text, max_bytes, strict_bml)
     if 0 < len(roots) <= max_documents:
         reader.wrapper, begins = wrapper, _begins(data)
+        if wrapper == FML_WRAPPER:
+            reader.fml = fml_of(data.decode())
         for root in roots:
             try:
                 yield reader.read(root, begins)
@@ -163,6 +166,12 @@ def read(
     except BMLError as error:
         yield error
         return
+    if "<fml" in text and not strict_bml:
+        reader.fml = fml_of(text)
+        if reader.fml is not None and not any(span.tag for span in spans):
+            reader.wrapper = FML_WRAPPER
+            yield reader.read(etree.Element("bml"), {})
+            return
     if not strict_bml and not any(span.tag for span in spans) and (start := start_of_speak(text)) >= 0:
         try:
             yield _spoken(text[start:], text.count("\n", 0, start), reader, max_bytes)
@@ -265,6 +274,7 @@ class _Reader:
     block_ids: Iterator[str]
     wrapper: str = ""  # local name of the element around the documents
     notes: tuple[str, ...] = ()  # about the whole text, for the first document
+    fml: Any = None  # the <fml> of the text, for the first document, or None
 
     def read(
         self,
@@ -303,7 +313,8 @@ class _Reader:
             line = any_node.sourceline
             any_node.sourceline = begins.get((line, local(str(node.tag))), line)
         is_core = plain is not None and str(root.tag).startswith(f"{{{CORE}}}")
-        report = "" if is_core else translate(root, self.wrapper, self.block_ids).text
+        report = "" if is_core else translate(root, self.wrapper, self.block_ids, self.fml).text
+        self.fml = None
         # A document in the namespace of BML 1.0 stays that, whatever some of its elements are.
         parts = translate_elements(root) if is_core else {}
         report = report or parts.pop(root, "")

@@ -13,6 +13,7 @@ from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from bml_schema import Block, read, write
+from bml_schema.dialects.intentions import intentions
 from bml_schema.dialects.table import MISSING, Row, table
 from bml_schema.undeclared_prefixes import SMARTBODY
 
@@ -57,6 +58,12 @@ Independently of dialects, without a warning: words of closed lists may be in an
 `<description>` without a priority has priority 1, `<synchronise>` is `<synchronize>`, and
 `bmlt:interrupt`, `bmlt:activate` and `bmlt:parametervaluechange` are those of BMLA. A document whose only
 fault are undeclared prefixes is read without them, with one warning. `--strict-bml` turns these off too.
+"""
+_INTENTIONS = """## Greta's FML
+
+What a speaker means (`bml_schema/dialects/fml.csv`, which names the literature) becomes behaviours of the
+document beside it, or of one of its own; `importance` scales amounts and intensities. What the table does not
+have, and emotions with `regulation="inhibited"` or `"masked"`, are named in the warning and not shown.
 """
 # Elements around documents -> a document in one, by the element.
 WRAPPERS = {
@@ -116,7 +123,16 @@ def render() -> str:
         lines += [f"## {title}", "", "| element | attribute | value | becomes |", "|---|---|---|---|"]
         lines += [_line(row) for row in table().rows if row.dialect == dialect]
         lines.append("")
+    lines += [_INTENTIONS, "| element | type | shown at importance 1 |", "|---|---|---|"]
+    lines += [
+        f"| `<{row.element}>` | `{row.value}` | {'nothing' if row.becomes == '-' else _marked(row)} |"
+        for row in intentions()
+    ]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _marked(row: Row) -> str:
+    return ", ".join(f"`{shown}`" for shown in row.becomes.split(";"))
 
 
 def _line(row: Row) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES
+from bml_schema.dialects.intentions import show_intentions
 from bml_schema.dialects.speech_text import translate_speech
 from bml_schema.dialects.sync_points import POINTS, SyncPoints
 from bml_schema.dialects.table import Report, Row, table
@@ -20,12 +21,13 @@ _OURS = frozenset({BMLA, BMLT, OWN})
 _JOINTS = frozenset({"eyes", "head", "neck", "chest", "back"})  # SmartBody's children of <gaze>
 
 
-def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> Report:
+def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str], fml: Any = None) -> Report:
     """Translate a document to BML 1.0 in place, and return what was translated; BML 1.0 does not change.
 
     Args:
         wrapper: local name of the element around <bml>, or "".
         block_ids: ids for blocks of a dialect without an id.
+        fml: Greta's <fml> beside <bml>, or None.
     """
     space = str(root.tag).rpartition("}")[0][1:]
     if space not in ("", CORE, *DRAFTS):
@@ -39,6 +41,8 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str]) -> R
         translation.add_composition()
     translation.run()
     made = translation.add_ids()
+    if fml is not None:
+        show_intentions(root, fml, translation.used, translation.apply)
     if wrapper == "act":
         translation.add_character()
     if not root.get("id", "").strip():
@@ -110,7 +114,7 @@ class _Translation:
 
     def _points(self) -> SyncPoints:
         kinds = {e.get("id", "").strip(): self._kind(e) for e in self.timed()}
-        return SyncPoints(kinds, self._apply, self.in_dialect)
+        return SyncPoints(kinds, self.apply, self.in_dialect)
 
     def _references(self, inside: Any, points: SyncPoints) -> None:
         for sync in inside.iter("{*}sync", "{*}before", "{*}after", "{*}synchronize", "{*}synchronise"):
@@ -133,8 +137,8 @@ class _Translation:
         if name in _JOINTS and local(str(parent.tag)) == "gaze":
             key = name = "sbm:joint"
         if name == "speech":
-            translate_speech(element, self._apply, words=self.in_dialect)
-        translate_reference(element, name, self._apply)
+            translate_speech(element, self.apply, words=self.in_dialect)
+        translate_reference(element, name, self.apply)
         own = self.table.elements.get(key) or self.table.elements.get(name)
         if stays and own is not None and own.becomes == "-":
             return
@@ -150,7 +154,7 @@ class _Translation:
             return
         for row in self.table.missing.get(name, ()) if self.in_dialect else ():
             if not element.get(row.attribute, "").strip():
-                self._apply(row)
+                self.apply(row)
                 for attribute, value in self._assignments(row, element, ""):
                     element.set(attribute, value)
         self._children(element)
@@ -162,7 +166,7 @@ class _Translation:
             return name, None
         return name, f"sbm:{name}" if space[1:] == SMARTBODY else name
 
-    def _apply(self, row: Row) -> None:
+    def apply(self, row: Row) -> None:
         self.applied[row] = None
 
     # attributes
@@ -193,10 +197,10 @@ class _Translation:
     def _attribute(self, element: Any, attribute: str, value: str, row: Row) -> bool:
         """Apply a row to an attribute; return whether the element stays."""
         if not row.becomes:
-            self._apply(row)
+            self.apply(row)
             return True
         if row.becomes == "!":
-            self._apply(row)
+            self.apply(row)
             remove_element(element)
             return False
         tag, _, becomes = row.becomes.rpartition(": ")
@@ -212,7 +216,7 @@ class _Translation:
                 return True
         elif becomes != "-":
             assignments = [(becomes, value)]
-        self._apply(row)
+        self.apply(row)
         element.attrib.pop(attribute, None)
         for name, text in assignments or ():
             if name not in element.attrib:
@@ -231,7 +235,7 @@ class _Translation:
 
     def _translate_element(self, element: Any, row: Row) -> bool:
         """Apply the row of an element; return whether the element stays."""
-        self._apply(row)
+        self.apply(row)
         if row.becomes == "-":
             remove_element(element)
             return False
