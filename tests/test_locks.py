@@ -3,28 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import pytest
-from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from tests.locks import HEAD, LOCKS, PROJECT, PYTHON, ROOT
-
-LINUX = {"python_version": PYTHON, "python_full_version": f"{PYTHON}.0", "sys_platform": "linux"}
-LINUX |= {"platform_system": "Linux", "platform_machine": "x86_64", "os_name": "posix"}
-
-
-def requirements(words: list[str]) -> Iterator[Requirement]:
-    """Yield what these requirements ask for on Linux, with the extras of the project that they name."""
-    for requirement in map(Requirement, words):
-        if requirement.marker is not None and not requirement.marker.evaluate(LINUX):
-            continue
-        if requirement.name == PROJECT["name"]:
-            for extra in requirement.extras:
-                yield from requirements(PROJECT["optional-dependencies"][extra])
-        else:
-            yield requirement
+from tests.locks import HEAD, LOCKS, PYTHON, ROOT, requirements
 
 
 def pins(text: str) -> Mapping[str, tuple[str, list[str]]]:
@@ -41,8 +25,7 @@ def test_lock_covers_what_the_project_asks_for(file: str) -> None:
     text = (ROOT / file).read_text("utf-8")
     assert text.startswith(HEAD.format(", ".join(LOCKS[file])))
     found = pins(text)
-    wanted = [f"{PROJECT['name']}[{extra}]" for extra in LOCKS[file]]
-    for requirement in requirements([*PROJECT["dependencies"], *wanted]):
+    for requirement in requirements(PYTHON, LOCKS[file]):
         version, hashes = found.get(canonicalize_name(requirement.name), ("none", []))
         message = f"{file} has {requirement.name} {version}, wanted {requirement}: run python -m tests.locks"
         assert hashes, message
