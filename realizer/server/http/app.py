@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -185,6 +184,9 @@ async def _socket(hub: Hub, socket: WebSocket) -> None:
     try:
         await hub.connections.serve(client)
         await client.close(1000, "")
+    except Exception:
+        log.exception("the WebSocket at %s failed", path)
+        await client.close(1011, "internal error")
     finally:
         await client.finish()
 
@@ -197,7 +199,7 @@ async def _site(hub: Hub, request: Request) -> Response:
     if not hub.site.is_public(path):
         hub.grant(request)
     known = request.headers.get("if-none-match", "")
-    return await run_in_threadpool(hub.site.answer, f"{quote(path)}?{request.url.query}", known)
+    return await asyncio.to_thread(hub.site.answer, f"{quote(path)}?{request.url.query}", known)
 
 
 async def _health(hub: Hub, request: Request) -> Response:
@@ -247,7 +249,7 @@ async def _findings(hub: Hub, body: bytes) -> Iterable[Finding]:
 
     # One at a time: sessions come first.
     async with hub.checking:
-        return await run_in_threadpool(
+        return await asyncio.to_thread(
             check, body, strict_bml=hub.settings.strict_bml, media=hub.settings.media
         )
 

@@ -138,7 +138,7 @@ COUNTERS = {
     "refused": "Connections that were refused.",
     "control_frames": "Pings, pongs and close frames of WebSockets that came in.",
     "over_limit": "Blocks that were refused because planning them takes more than max_planning steps.",
-    "rate_exceeded": "How often a WebSocket began to exceed max_rate, and was read more slowly.",
+    "rate_exceeded": "How often a connection began to exceed max_rate, and was read more slowly.",
     "http_errors": "HTTP requests that were answered with a status of 400 to 499.",
     "http_failures": "HTTP requests that were answered with a status of 500 or more.",
     "frames_dropped": "Frames, pictures and sound packets that slow clients, or an overload, left out.",

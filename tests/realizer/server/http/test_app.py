@@ -162,6 +162,15 @@ def test_app_says_in_words_that_it_has_a_fault(app, monkeypatch, caplog) -> None
     assert b"realizer_http_failures_total 1" in app("GET", "/metrics")[2]
 
 
+def test_app_closes_a_websocket_that_fails(app, monkeypatch, caplog) -> None:
+    monkeypatch.setattr("realizer.server.http.page_tools.lint", None)
+    with connect(app.url.replace("http", "ws") + "/check", open_timeout=LIMIT) as socket:
+        socket.send("<bml/>")
+        with pytest.raises(ConnectionClosed, match=r"1011.*internal error"):
+            socket.recv(LIMIT)
+    assert "the WebSocket at /check failed" in caplog.text
+
+
 def test_app_says_when_to_try_again(app, monkeypatch) -> None:
     for status, retry in ((503, True), (429, True), (503, False), (400, True)):
 
