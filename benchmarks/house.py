@@ -1,10 +1,10 @@
 """Measures the structure of the code: `python benchmarks/house.py [CHECKOUT ...]` prints a table.
 
-The table counts Python files of the packages, tests, benchmarks and training scripts. All imports
-count, also those in functions and for types; an import from a package counts for its `__init__`, unless it names a module. Files that import
-each other, directly or not, form a circle. The tests of a module are in tests/PACKAGE/test_MODULE.py.
-Parameters of commands do not count. Below the table are the circles, and the paths of a document and of a
-frame.
+The table counts Python files of the packages, tests, benchmarks and training scripts. All imports count, also
+those in functions and for types; an import from a package counts for its `__init__`, unless it names a module.
+Files that import each other, directly or not, form a circle. The tests of a module are in
+tests/PACKAGE/test_MODULE.py. Parameters of commands do not count. Below the table are the circles, and the
+paths of a document and of a frame.
 
 The paths are traced in a service (not with --static). The path of a document has the modules that run between
 the receipt of a speech and the first function of realizer/scheduling; the path of a frame has those that run

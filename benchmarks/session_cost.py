@@ -53,7 +53,7 @@ def new_session(number: int, ahead: float) -> Session:
 
 def tick(session: Session, now: float) -> float:
     """Do what the host does at a deadline. Return the next one."""
-    due = session.due.send_alone(now)
+    due = session.ticker.send_ready(now)
     if due is None:
         session.tick(now, read_documents=False)
         due = session.next_due()

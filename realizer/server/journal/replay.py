@@ -167,7 +167,7 @@ def replay_until(
         if session.clock.stands_still(due):
             return  # it was published when the documents of a message had been planned
         before(due)
-        session.due.publish(due)
+        session.ticker.publish(due)
 
 
 def restore_checkpoint(session: Session, parts: Mapping[str, str]) -> float:

@@ -240,7 +240,7 @@ class SessionRunner:
 
     def _send_due(self, session: Session, now: float) -> None:
         try:
-            due = session.due.send_alone(session.clock.read(now))
+            due = session.ticker.send_ready(session.clock.read(now))
         except Exception:
             self._fail(session)
             return

@@ -31,10 +31,11 @@ from realizer.server.journal.session_journal import SessionJournal
 from realizer.server.session.character_faces import CharacterFaces
 from realizer.server.session.connections import Connection, Connections, FeedbackLog
 from realizer.server.session.control_handlers import PASSING, ControlHandlers
-from realizer.server.session.due_work import DueWork, SessionClock
 from realizer.server.session.effects import Close, Effect, Sight
 from realizer.server.session.query_handlers import QueryHandlers
+from realizer.server.session.session_clock import SessionClock
 from realizer.server.session.subscriptions import Subscriptions
+from realizer.server.session.ticker import Ticker
 from realizer.server.session.tracked_faces import TrackedFaces
 from realizer.server.speech.audio_clips import AudioClips
 from realizer.server.streams.broadcast import Broadcast
@@ -113,7 +114,7 @@ class Session:
             self.tracked,
             self.connections.reply,
         )
-        self.due = DueWork(
+        self.ticker = Ticker(
             self.clock, self.player, self.submission, self.broadcast, self.connections, self._controls
         )
 
@@ -144,7 +145,7 @@ class Session:
             self.journal.note(self.clock.read(now), "leave", connection)
         self._controls.on_disconnect(connection, self.clock.read(now))
         self.tracked.drop(connection)
-        self.due.must_end_speech = True
+        self.ticker.must_end_speech = True
         if not self.connections:
             self.empty_since = now
             if not self.named and not is_awaited:
@@ -165,7 +166,7 @@ class Session:
     def update_backlog(self, connection: int, waiting: int) -> None:
         """Take the number of unsent bytes of a client, as `Connections.update_backlog`."""
         if self.connections.update_backlog(connection, waiting):
-            self.due.quiet_until = -math.inf
+            self.ticker.quiet_until = -math.inf
 
     # messages in --------------------------------------------------------------------------------
 
@@ -175,11 +176,11 @@ class Session:
             return
         message = _as_text(message) if isinstance(message, bytes) else message
         t = self.clock.read(now)
-        self.due.send_before_change(t)
+        self.ticker.send_before_change(t)
         if self.journal.needs_checkpoint and not self.journal.compact(t):
             return
         in_journal = self._handle(connection, message, t)
-        if not self.closed and self.due.work(t) and not in_journal:
+        if not self.closed and self.ticker.tick(t) and not in_journal:
             self.journal.note(t, "tick")
 
     def _handle(self, id: int, message: str | bytes, t: float) -> bool:
@@ -233,10 +234,10 @@ class Session:
         if self.closed:
             return
         t = self.clock.read(now)
-        self.due.send_before_change(t)
+        self.ticker.send_before_change(t)
         if self.journal.note(t, "spoken", speak, "" if isinstance(result, Utterance) else str(result)):
             self._effects += self.submission.tts.answer(speak, result, t)
-            self.due.work(t)
+            self.ticker.tick(t)
 
     def on_picture(self, draw: int, result: bytes | RealizerError, now: float) -> None:
         """Take the answer to an effect `Draw`. If it is an error, the subscriptions to the picture end."""
@@ -261,17 +262,17 @@ class Session:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document."""
         t = self.clock.read(now)
         starts = not self.submission.has_work
-        if not self.closed and self.due.work(t, read_documents, starts=starts):
+        if not self.closed and self.ticker.tick(t, read_documents, starts=starts):
             self.journal.note(t, "tick")
 
     @property
     def has_documents(self) -> bool:
         """Whether a document can be read or planned now."""
-        return not self.closed and self.due.has_documents
+        return not self.closed and self.ticker.has_documents
 
     def next_due(self) -> float:
         """Return the time of the next event other than documents; infinity if there is none."""
-        return math.inf if self.closed else self.due.next_time() + self.clock.opened
+        return math.inf if self.closed else self.ticker.next_time() + self.clock.opened
 
     @property
     def busy(self) -> bool:
@@ -297,7 +298,7 @@ class Session:
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
         if self.journal.needs_checkpoint and not self.closed:
-            self.due.publish(t := self.clock.read(now))
+            self.ticker.publish(t := self.clock.read(now))
             self.journal.compact(t)
 
 

@@ -125,7 +125,7 @@ class Driver:
         """As the shell does it."""
         due = None
         if not self.session.has_documents:
-            due = self.session.due.send_alone(self.session.clock.read(self.opened + self.now))
+            due = self.session.ticker.send_ready(self.session.clock.read(self.opened + self.now))
         if due is None:
             self.session.tick(self.opened + self.now)
         else:

@@ -9,7 +9,7 @@ from realizer.core.settings import Settings
 from realizer.scheduling.timing import Warning
 from realizer.server.documents import document_queue
 from realizer.server.documents.document_queue import DocumentQueue, block_id_of
-from realizer.server.session.due_work import STANDSTILL
+from realizer.server.session.session_clock import STANDSTILL
 from tests.realizer.server.conftest import Driver, spoken
 
 WAIT = '<bml id="{}"><wait id="w" duration="1"/></bml>'

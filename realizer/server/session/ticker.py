@@ -1,4 +1,4 @@
-"""The clock of a session, and the work that is due: feedback, frames, sound and documents."""
+"""The ticks of a session: feedback, frames and sound are sent when they are due, documents read in turn."""
 
 import math
 from dataclasses import dataclass
@@ -9,63 +9,14 @@ from realizer.server.documents.document_queue import Submission
 from realizer.server.session.connections import Connections
 from realizer.server.session.control_handlers import ControlHandlers
 from realizer.server.session.effects import Effect
+from realizer.server.session.session_clock import SessionClock
 from realizer.server.streams.broadcast import Broadcast
 from realizer.server.streams.frame_windows import EPSILON
 
-# The clock stands still for at most so long, while the documents of a message are planned.
-STANDSTILL = 0.1  # s
-
-
-class SessionClock:
-    """The clock of a session, in seconds since the session opened.
-
-    It never goes back, even if the host's clock does: what arrives late counts as arriving now. All documents
-    of one message are planned for one instant: the clock stands still meanwhile. Blocks that start at an
-    instant start after everything that arrives at this instant: until then they are held.
-
-    Args:
-        opened: seconds on the host's clock when the session opened.
-    """
-
-    def __init__(self, opened: float) -> None:
-        self.opened = opened  # seconds on the host's clock at 0 of this one; a restored session moves it
-        self._latest = 0.0  # nothing happens before this time any more
-        self._instant = -math.inf  # where the clock stands still
-        self._held = -math.inf  # blocks that start at this time or earlier are held
-
-    def read(self, now: float) -> float:
-        """Return the time of something that happens, which is at or after all that has happened."""
-        self._latest = max(now - self.opened, self._latest)
-        return self._latest
-
-    def end_instant(self, t: float) -> None:
-        """End an instant, because blocks start at it: what happens next comes after it."""
-        self._latest = max(self._latest, math.nextafter(t, math.inf))
-
-    def stand_still(self, t: float = -math.inf) -> None:
-        """Stand still at a time, for at most `STANDSTILL`, or go on."""
-        self._instant = t
-
-    def stands_still(self, t: float) -> bool:
-        """Return whether it stands still at a time."""
-        return self._instant <= t <= self._instant + STANDSTILL
-
-    def present(self, t: float) -> float:
-        """Return the time at which it stands still, or else `t`."""
-        return self._instant if self.stands_still(t) else t
-
-    def hold(self, t: float = -math.inf) -> None:
-        """Hold the blocks that start at a time, because more may arrive at this instant; or none."""
-        self._held = t
-
-    def start_of(self, event: float) -> float:
-        """Return when a block that is due at `event` starts: later if it is held for documents that wait."""
-        return event if event > self._held else self._held + STANDSTILL
-
 
 @dataclass(eq=False)
-class DueWork:
-    """The work of a session that is due. All times are those of its clock."""
+class Ticker:
+    """Sends what is due, and reads or plans the next document. All times are those of the session's clock."""
 
     clock: SessionClock
     player: Player
@@ -75,12 +26,12 @@ class DueWork:
     controls: ControlHandlers
     must_end_speech: bool = False  # with the next work, as a client has left, or sends no more of a clip
     quiet_until: float = -math.inf  # until then nothing but feedback and frames is due
-    # when feedback and frames are due, as of the last `next_time` or `send_alone`
+    # when feedback and frames are due, as of the last `next_time` or `send_ready`
     _next_feedback: float = -math.inf
     _next_frames: float = -math.inf
 
-    def send_alone(self, t: float) -> float | None:
-        """Send the due feedback and frames, and return when something is due next; None for `work`.
+    def send_ready(self, t: float) -> float | None:
+        """Send the due feedback and frames, and return when something is due next; None for `tick`.
 
         This is the fast way for a session in which nothing else is due.
         """
@@ -97,7 +48,7 @@ class DueWork:
             self._next_frames = self.broadcast.next_frame
         return min(self.quiet_until, self._next_feedback, self._next_frames)
 
-    def work(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
+    def tick(self, t: float, read_documents: bool = True, *, starts: bool = False) -> bool:
         """Send due feedback, sound and frames; then, with `read_documents`, read or plan one document.
 
         Args:
