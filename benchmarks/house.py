@@ -1,8 +1,8 @@
 """Measures the structure of the code: `python benchmarks/house.py [CHECKOUT ...]` prints a table.
 
 The table counts Python files of the packages, tests, benchmarks and training scripts. All imports count, also
-those in functions and for types; an import from a package counts for its `__init__`, unless it names a module.
-Files that import each other, directly or not, form a circle. The tests of a module are in
+those in functions and for types; an import from a package counts for its `__init__`, unless it names a
+module. Files that import each other, directly or not, form a circle. The tests of a module are in
 tests/PACKAGE/test_MODULE.py. Parameters of commands do not count. Below the table are the circles, and the
 paths of a document and of a frame.
 
