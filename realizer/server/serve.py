@@ -17,7 +17,8 @@ from realizer.face.fap_mapping import mapping_of
 from realizer.scheduling import warm_up
 from realizer.server.http.hub import Hub
 from realizer.server.http.server import HttpServer, startup_lines
-from realizer.server.runtime.session_host import SessionHost, disable_automatic_gc
+from realizer.server.runtime.garbage import disable_automatic_gc
+from realizer.server.runtime.session_host import SessionHost
 from realizer.server.transports.transport import Transport, requested
 
 # s; a thread waits so long before it takes Python's lock from the event loop. While documents are planned the

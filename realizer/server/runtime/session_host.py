@@ -1,67 +1,44 @@
-"""The host of all sessions of the service: it opens, restores and ends them; the garbage of ended ones."""
+"""The host of all sessions of the service: clients join, sessions are opened, restored and ended."""
 
 import asyncio
 import contextlib
-import gc
+import itertools
+import logging
 from functools import partial
 
 from realizer.core.settings import Settings
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
+from realizer.server.runtime.engines import Engines
+from realizer.server.runtime.garbage import GcPolicy
 from realizer.server.runtime.session_factory import SessionFactory
-from realizer.server.runtime.session_registry import ANYBODY, Visitor, worker_of
-from realizer.server.runtime.session_runner import SessionRunner
+from realizer.server.runtime.session_loop import SessionLoop
+from realizer.server.runtime.session_registry import (
+    ANYBODY,
+    JoinError,
+    SessionRegistry,
+    Visitor,
+    worker_of,
+)
 from realizer.server.session.effects import Close
 from realizer.server.session.session import Session
+from realizer.server.transports.transport import Outbound
+
+log = logging.getLogger(__name__)
 
 DRAIN_STEP = 0.05  # s; how often `drain` checks whether everything has ended
 DEGRADED = "degraded"  # status of `/healthz` while the process is overloaded
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
-# Closed connections leave cycles: a collection is due after this many, or as many as are still open.
-ENDED = 100
-# Other cycles show in the memory of the process: it has grown to this factor and by these bytes, and by the
-# most that a behaviour takes which plays or is planned. While ten thousand play, a collection takes long.
-GROWN, MORE, PLAYED = 1.5, 100e6, 35e3
+MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
+CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
 
 
-def disable_automatic_gc() -> None:
-    """Disable Python's automatic collections.
-
-    Playing leaves no cycles, and a full collection among the objects of a thousand sessions takes a quarter
-    of a second, one of the youngest generation 10 ms.
-    """
-    gc.collect()
-    gc.freeze()  # tables and faces live as long as the service
-    gc.disable()
-
-
-class GcPolicy:
-    """A policy of full collections, for when there may be many cycles."""
-
-    def __init__(self) -> None:
-        self.ended_connections = 0
-        self._least = memory()
-
-    def collect_if_needed(self, alive: int, behaviours: int = 0) -> bool:
-        """Run a full collection if one is due. Return whether it was.
-
-        Args:
-            alive: number of open connections.
-            behaviours: number of behaviours of all blocks.
-        """
-        used = memory()
-        self._least = min(self._least, used)
-        most = GROWN * self._least + MORE + PLAYED * behaviours
-        if self.ended_connections < max(ENDED, alive) and used < most:
-            return False
-        gc.collect()
-        self.ended_connections, self._least = 0, memory()
-        return True
-
-
-class SessionHost(SessionRunner):
+class SessionHost:
     """All sessions of the service.
+
+    Transports let their clients `join`, pass on messages by the number that this returns, and `leave`. What a
+    session sends goes to the `Outbound` that joined.
 
     Args:
         worker: number of this process among `settings.workers`; None if it is the only one.
@@ -73,9 +50,23 @@ class SessionHost(SessionRunner):
                 return False  # another process may have it; only `restore`, before `join`, finds out
             return worker is None or worker_of(session, settings.workers, settings) == worker
 
-        metrics = Metrics(worker)
-        self._factory = SessionFactory(settings, metrics)
-        super().__init__(settings, metrics, self._factory.overload, self._factory.new, is_local)
+        self.settings = settings
+        self.metrics = Metrics(worker)
+        self._factory = SessionFactory(settings, self.metrics)
+        self._overload = self._factory.overload
+        self._clients: dict[int, Outbound] = {}
+        self._numbers = itertools.count(1)
+        self._loop = SessionLoop(
+            Engines(settings.deformer),
+            self._clients,
+            self.metrics,
+            self._overload,
+            lambda *move: self._registry.move_connections(*move),
+            self._fail,
+        )
+        self._registry = SessionRegistry(
+            self._factory.new, settings, is_local, self._loop.call, self._loop.cancel, self._overload
+        )
         self._expiry_timer: asyncio.TimerHandle | None = None
         self._gc_policy = GcPolicy()
         self._takeover_check: asyncio.Task[None] | None = None
@@ -92,9 +83,9 @@ class SessionHost(SessionRunner):
             TableError: the mapping, or a user's expression, cannot be used.
             JournalError: the journal cannot be opened.
         """
-        await super().start()
+        self._loop.start()
         await self._factory.load()
-        self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
+        self._expiry_timer = asyncio.get_running_loop().call_later(EXPIRY_INTERVAL, self._expire_sessions)
 
     def stop_accepting(self) -> None:
         """Refuse documents from now on."""
@@ -118,13 +109,14 @@ class SessionHost(SessionRunner):
     def busy(self) -> bool:
         """Whether a block plays, waits or is being prepared."""
         sessions = self._registry.sessions.values()
-        return any(self._calls.is_busy(session) or session.busy for session in sessions)
+        return any(self._loop.is_busy(session) or session.busy for session in sessions)
 
     async def close(self) -> None:
+        """End every session and every engine."""
         for task in (self._expiry_timer, self._takeover_check):
             if task is not None:
                 task.cancel()
-        await super().close()
+        await self._loop.close(self._registry.sessions.values())
         self._factory.close()
 
     def health(self) -> dict[str, object]:
@@ -149,6 +141,63 @@ class SessionHost(SessionRunner):
             {"frames_dropped": dropped},
         )
 
+    # connections --------------------------------------------------------------------------------
+
+    def join(
+        self, client: Outbound, name: str | None = None, seen: int | None = None, visitor: Visitor = ANYBODY
+    ) -> int:
+        """Add a client to the named session, or to a new one, and return the number of its connection.
+
+        Raises:
+            JoinError: as `check`.
+        """
+        number = next(self._numbers)
+        self._clients[number] = client
+        try:
+            self._registry.open(number, name, self._loop.time(), seen, visitor)
+        except JoinError:
+            del self._clients[number]
+            raise
+        return number
+
+    def receive(self, number: int, message: str | bytes) -> bool:
+        """Pass on a message of a connection. Return False if it is in no session any more."""
+        session = self._registry.session_of.get(number)
+        if session is None or session.closed:
+            return False
+        self.metrics.counts["messages"] += 1
+        began = self._loop.time()
+        self._loop.call(session, partial(self._receive, session, number, message))
+        self._loop.report_slow_step(began, f"a message of {len(message)} characters", session, [number])
+        return True
+
+    def is_congested(self, number: int) -> bool:
+        """Return whether so many messages of a connection's session wait that no more should be read."""
+        session = self._registry.session_of.get(number)
+        return session is not None and self._loop.count_waiting(session) >= MOST_WAITING
+
+    async def wait_for_room(self, number: int) -> None:
+        """Wait while a connection's session is congested."""
+        while self.is_congested(number):
+            await asyncio.sleep(CONGESTION)
+
+    def _receive(self, session: Session, number: int, message: str | bytes) -> None:
+        if (present := self._registry.session_of.get(number)) is not session and present is not None:
+            self.receive(number, message)  # it has moved while the message waited
+            return
+        # A client that only asks and never reads must be noticed here: nothing else may ever be due.
+        self._loop.update_backlog(session, number)
+        session.receive(number, message, self._loop.time())
+
+    def leave(self, number: int) -> None:
+        """Remove a closed connection."""
+        left = self._registry.session_of.get(number)
+        if left is not None and (connection := left.connections.get(number)) is not None:
+            self.metrics.counts["frames_dropped"] += connection.dropped
+        self._registry.leave(number, self._loop.time())
+        self._clients.pop(number, None)
+        self._gc_policy.ended_connections += 1
+
     # sessions -----------------------------------------------------------------------------------
 
     def check(self, name: str | None, visitor: Visitor = ANYBODY) -> None:
@@ -169,7 +218,7 @@ class SessionHost(SessionRunner):
             await asyncio.shield(self._restoring[name])
         session = self._registry.sessions.get(name)
         if session is not None and name in self._resumed and session.feedback_log.newest < (seen or 0):
-            self._call(session, partial(self._catch_up, session, seen or 0))
+            self._loop.call(session, partial(self._catch_up, session, seen or 0))
 
     def _is_live(self, name: str) -> bool:
         """Whether the session plays here. One that another process has taken over may still be registered."""
@@ -178,13 +227,13 @@ class SessionHost(SessionRunner):
 
     async def _restore(self, name: str, seen: int) -> None:
         try:
-            restored = await self._factory.restore(name, seen, self._engines.speak)
+            restored = await self._factory.restore(name, seen, self._loop.engines.speak)
             if restored is not None:
                 session, unanswered = restored
                 self._registry.sessions[name] = session
                 self._resumed[name] = self._loop.time() + self.settings.keep
-                self._run(session, unanswered)
-                self._apply_effects(session)
+                self._loop.run(session, unanswered)
+                self._loop.apply_effects(session)
         finally:
             del self._restoring[name]
 
@@ -193,10 +242,6 @@ class SessionHost(SessionRunner):
 
         now = self._loop.time()
         session.clock.opened -= catch_up(session, now, seen) - now
-
-    def leave(self, number: int) -> None:
-        super().leave(number)
-        self._gc_policy.ended_connections += 1
 
     def oldest_in_use(self, ignored: type) -> str | None:
         """Return the name of the oldest session with a client of another class than `ignored`, or None."""
@@ -214,22 +259,33 @@ class SessionHost(SessionRunner):
         self._end(session, 1000, "the session was ended")
         return True
 
+    def _end(self, session: Session, code: int, reason: str) -> None:
+        numbers = self._registry.joined(session)
+        self._loop.run(session, [Close(number, code, reason) for number in numbers])
+        self._registry.end(session)
+        self._loop.apply_effects(session)
+
+    def _fail(self, session: Session) -> None:
+        log.exception("session %s ends: it failed", session.id)
+        self.metrics.counts["failures"] += 1
+        self._end(session, 1011, "internal error")  # in the journal, too: a restored session would fail again
+
     # every few seconds --------------------------------------------------------------------------
 
     def _compact_journal(self, session: Session) -> None:
-        if self._closed:
+        if self._loop.is_closed:
             return
         began = self._loop.time()
-        self._call(session, lambda: session.compact_journal(self._loop.time()))
-        self._report_slow_step(began, "a checkpoint of the journal", session)
+        self._loop.call(session, lambda: session.compact_journal(self._loop.time()))
+        self._loop.report_slow_step(began, "a checkpoint of the journal", session)
 
     async def _check_takeovers(self) -> None:
         for session in await self._factory.taken_over(self._registry.sessions.values()):
-            self._calls.cancel(session)
+            self._loop.cancel(session)
             waiting = self._registry.joined(session).difference(session.connections)
             session.hand_over(error := TakenOver(session.id))
-            self._apply_effects(session)
-            self._run(session, [Close(number, 1012, str(error)) for number in waiting])
+            self._loop.apply_effects(session)
+            self._loop.run(session, [Close(number, 1012, str(error)) for number in waiting])
 
     def _expire_sessions(self) -> None:
         sessions = self._registry.sessions.values()
@@ -243,7 +299,9 @@ class SessionHost(SessionRunner):
         # Spread the checkpoints over the time until the next call.
         grown = [session for session in self._registry.sessions.values() if session.journal.needs_checkpoint]
         for k, session in enumerate(grown):
-            self._loop.call_later(EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session)
+            asyncio.get_running_loop().call_later(
+                EXPIRY_INTERVAL * k / len(grown), self._compact_journal, session
+            )
         if self._takeover_check is None or self._takeover_check.done():
-            self._takeover_check = self._loop.create_task(self._check_takeovers())
-        self._expiry_timer = self._loop.call_later(EXPIRY_INTERVAL, self._expire_sessions)
+            self._takeover_check = asyncio.create_task(self._check_takeovers())
+        self._expiry_timer = asyncio.get_running_loop().call_later(EXPIRY_INTERVAL, self._expire_sessions)

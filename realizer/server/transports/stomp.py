@@ -11,9 +11,8 @@ from typing import Any
 from bml_schema import WarningFeedback
 from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings, limit_hint
-from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_host import CONGESTION, SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.runtime.session_runner import CONGESTION
 from realizer.server.transports.broker import BrokerConnection, check_installed
 from realizer.server.transports.message_formats import (
     AsapJson,

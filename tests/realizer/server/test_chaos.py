@@ -93,7 +93,7 @@ def test_chaos_killed_voice_costs_its_sound_and_one_warning(
         async with connect(server.url, max_queue=None) as client:
             await client.send(TALK.format("first", "One."))
             first = await until(client, 'id="first:end"')
-            engine = server._sessions._engines._voices["espeak"]
+            engine = server._sessions._loop.engines._voices["espeak"]
             assert isinstance(engine, EspeakVoice)
             assert engine.pid is not None
             os.kill(engine.pid, signal.SIGSTOP)  # so that it can never answer before it dies
@@ -140,7 +140,7 @@ def test_chaos_killed_renderer_is_started_again() -> None:
         async with connect(server.url, max_queue=None) as client:
             await client.send('{"type":"subscribe","stream":"video","size":[32,32],"fps":5}')
             times = [await picture(client)]
-            (place,) = server._sessions._engines._slots.values()
+            (place,) = server._sessions._loop.engines._slots.values()
             assert place.renderer.pid is not None
             os.kill(place.renderer.pid, signal.SIGKILL)
             times += [await picture(client) for _ in range(3)]

@@ -16,10 +16,9 @@ import pytest
 from bml_schema.feedback import parse_feedback
 from realizer.core.settings import Settings
 from realizer.protocol.wire import unpack
-from realizer.server.runtime import session_host, turns
-from realizer.server.runtime.session_host import ENDED, GcPolicy, SessionHost
+from realizer.server.runtime import turns
+from realizer.server.runtime.session_host import MOST_WAITING, SessionHost
 from realizer.server.runtime.session_registry import JoinError
-from realizer.server.runtime.session_runner import MOST_WAITING
 from realizer.server.session.connections import SLOW
 from tests.worst_documents import document
 
@@ -426,13 +425,6 @@ def test_session_host_closes_clients_of_a_taken_session(in_tiny_slices, tmp_path
         runner.run(run())
 
 
-class Knot:
-    """Holds itself."""
-
-    def __init__(self) -> None:
-        self.itself = self
-
-
 @pytest.fixture
 def no_automatic_gc() -> Iterator[None]:
     """Python looks for no cycles while a test counts them."""
@@ -442,27 +434,6 @@ def no_automatic_gc() -> Iterator[None]:
     yield
     if was:
         gc.enable()
-
-
-def knot() -> weakref.ref[Knot]:
-    return weakref.ref(Knot())
-
-
-@pytest.mark.usefixtures("no_automatic_gc")
-def test_gc_policy_collects_when_as_many_have_ended_as_are_alive() -> None:
-    known, tied = GcPolicy(), knot()
-    for ended, alive, looked in (
-        (ENDED - 1, 0, False),
-        (ENDED, 300, False),
-        (299, 300, False),
-        (300, 300, True),
-    ):
-        known.ended_connections = ended
-        assert tied() is not None
-        assert known.collect_if_needed(alive) is looked
-    assert tied() is None
-    assert known.ended_connections == 0
-    assert not known.collect_if_needed(0)
 
 
 @pytest.mark.usefixtures("no_automatic_gc")
@@ -478,17 +449,3 @@ def test_session_host_frees_the_blocks_of_a_session_that_ends() -> None:
         assert playing() is None
 
     hosted(test)
-
-
-@pytest.mark.usefixtures("no_automatic_gc")
-def test_gc_policy_collects_when_the_process_has_grown(monkeypatch: pytest.MonkeyPatch) -> None:
-    used = 200e6
-    monkeypatch.setattr(session_host, "memory", lambda: used)
-    known, tied = GcPolicy(), knot()
-    used = 390e6
-    assert not known.collect_if_needed(1000)
-    used = 410e6
-    assert not known.collect_if_needed(1000, 1000)  # what plays needs memory too
-    assert known.collect_if_needed(1000)
-    assert tied() is None
-    assert not known.collect_if_needed(1000)  # that is how large it is now

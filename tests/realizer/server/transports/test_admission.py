@@ -26,7 +26,7 @@ from realizer.core.settings import Settings, SettingsError
 from realizer.server.documents import limits
 from realizer.server.http import access
 from realizer.server.http.access import Grant
-from realizer.server.runtime import session_runner
+from realizer.server.runtime import session_loop
 from realizer.server.serve import Server
 from tests.waiting import LIMIT
 
@@ -380,7 +380,7 @@ def test_admission_metrics_count_what_happened() -> None:
 def test_admission_metrics_count_slow_steps_and_the_log_names_them(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(session_runner, "SLOW_STEP", 0.0)
+    monkeypatch.setattr(session_loop, "SLOW_STEP", 0.0)
 
     async def test(server: Server) -> None:
         async with connect(f"{server.url}?session=show") as socket:

@@ -21,7 +21,7 @@ from bml_schema.feedback import (
     parse_feedback,
 )
 from realizer.core.settings import Settings
-from realizer.server.runtime import session_runner
+from realizer.server.runtime import session_host
 from realizer.server.serve import Server
 from realizer.server.transports import asap
 from realizer.server.transports.asap import AsapTransport
@@ -426,14 +426,14 @@ def test_asap_plays_hundreds_of_documents_at_once() -> None:
 
 
 def test_asap_reads_no_more_while_the_session_is_congested(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session_runner, "MOST_WAITING", 0)  # it always is
+    monkeypatch.setattr(session_host, "MOST_WAITING", 0)  # it always is
 
     async def test(server: Server, bml: int, port: int) -> None:
         async with Client(bml, port) as client:
             client.send(WAIT.format("a", 0.1) + WAIT.format("b", 0.1))
             feedback = await client.until("a:end")
             assert {f.id.partition(":")[0] for f in feedback if isinstance(f, BlockProgress)} == {"a"}
-            monkeypatch.setattr(session_runner, "MOST_WAITING", 100)
+            monkeypatch.setattr(session_host, "MOST_WAITING", 100)
             await client.until("b:end")
 
     serving(test)

@@ -9,9 +9,10 @@ from typing import Any, cast
 
 from realizer.core.settings import Settings
 from realizer.server.runtime.engines import Engines
-from realizer.server.runtime.session_host import SessionHost
+from realizer.server.runtime.session_loop import SessionLoop
 from realizer.server.session.effects import Close, Send, Speak
 from realizer.server.session.session import Session
+from realizer.server.transports.transport import Outbound
 from realizer.speech.utterance import SpeechRequest
 from tests.realizer.server.conftest import spoken
 
@@ -46,11 +47,12 @@ async def delivered(*effects: Any) -> tuple[Client, Pool, list[Any]]:
     """Run effects of a session with one client; return it, the pool of voices, and where answers go."""
     client, pool, deliveries = Client(), Pool(), list[Any]()
     engines = cast(Engines, SimpleNamespace(speech_pool=pool, speak=lambda effect: spoken()))
-    host: Any = SessionHost(Settings())
-    host._loop, host._engines, host._clients = asyncio.get_running_loop(), engines, {1: client}
-    host._deliver = lambda session, answer: deliveries.append(answer)
+    none: Any = None
+    loop: Any = SessionLoop(engines, {1: cast(Outbound, client)}, none, none, none, none)
+    loop.start()
+    loop._deliver = lambda session, answer: deliveries.append(answer)
     session = Session("s", Settings(), 0.0)
-    host._run(session, effects)
+    loop.run(session, effects)
     for future in pool.futures[:1]:
         future.set_result(spoken())
     for future in pool.futures[1:]:
