@@ -4,6 +4,7 @@ realize(source)   play BML, a text or files without a clock: frames, pictures, s
 schedule(source)  the sync times alone
 check(source)     every fault, with line, column and help
 enrich(text)      BML with expressions from the knowledge base
+spoken_text(text) what a voice is given of a text with Markdown, stage directions, emoji and numbers
 emotion(word)     the FAPs of an emotion
 voices(), faces() what there is
 load_face(name)   a face folder or a GLB head as arrays
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
     from realizer.server.serve import serve as serve
     from realizer.speech.registry import VoiceInfo as VoiceInfo
     from realizer.speech.registry import voices as voices
+    from realizer.text.spoken import spoken_text as spoken_text
 
 __version__ = "0.3.0"
 
@@ -68,6 +70,7 @@ _NAMES = {
     "realizer.scheduling.timing": "Schedule",
     "realizer.server.serve": "serve",
     "realizer.speech.registry": "VoiceInfo voices",
+    "realizer.text.spoken": "spoken_text",
 }
 _HOMES = {
     name.partition("=")[0]: (module, name.rpartition("=")[2])

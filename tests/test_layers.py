@@ -34,11 +34,14 @@ LAYERS = (
     "realizer.core realizer.examples",
     "realizer.tables",
     "bml_schema",
-    "realizer.scheduling realizer.speech realizer.sources",
+    "realizer.text",
+    "realizer.scheduling realizer.speech",
     "realizer.animation",
     "realizer.face",
     "realizer.emotions realizer.expressions realizer.knowledge",
     "realizer.behaviours",
+    "realizer.spoken_block",
+    "realizer.sources",
     "realizer.render",
     "realizer.playback",
     "realizer.realization",
@@ -72,6 +75,7 @@ CLIENT = {
 
 # The packages or modules that may import a heavy library.
 IMPORTERS = {
+    "markdown_it": ("realizer.text",),
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face", "realizer_studio.faces", "realizer_studio.editors.face"),
     "numba": ("realizer.render.compiled",),
