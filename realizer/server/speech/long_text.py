@@ -9,10 +9,11 @@ import numpy as np
 
 from realizer.core.array_types import Int16
 from realizer.playback.scheduled_speech import resample
-from realizer.server.speech.sentence_splitter import TAG, SentenceSplitter, is_sentence
+from realizer.server.speech.sentence_splitter import SentenceSplitter, is_sentence
 from realizer.speech.duration_fit import shortened
 from realizer.speech.ssml import NAMED
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
+from realizer.text.parts import ANY_TAG as TAG
 
 # Least length of the second and further parts. Each is planned separately, so that frames are not delayed.
 PART = 400

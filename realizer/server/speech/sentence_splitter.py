@@ -6,9 +6,8 @@ from typing import Any
 
 from realizer import tables
 from realizer.speech.ssml import EMPTY
+from realizer.text.parts import ANY_TAG as TAG
 
-# A tag; groups: "/" of an end tag, name, attributes, "/" of an empty element.
-TAG = re.compile(r"<(/?)([A-Za-z_][\w.-]*(?::[\w.-]+)?)((?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(/?)>")
 VALUE = r"(?:\"[^\"]*\"|'[^']*'|[^\s\"'<>/]+)"
 BEGUN = re.compile(  # an incomplete tag
     rf"</?(?:[A-Za-z_][\w.:-]*(?:\s+[\w.:-]+\s*=\s*{VALUE})*+"

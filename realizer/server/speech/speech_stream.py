@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from bml_schema import Block, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import SentenceSplitter, is_sentence
-from realizer.server.speech.speech_chunks import Chunk, clip_block, text_block
+from realizer.spoken_block import Chunk, clip_block, text_block
 
 
 @dataclass(eq=False)

@@ -12,8 +12,8 @@ from realizer.playback.references import references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
 from realizer.scheduling.timing import UNKNOWN, Warning
 from realizer.server.session.control_fields import FieldError
-from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
+from realizer.spoken_block import Chunk
 
 # The anticipated end of an open speech is so much later than now, so that it counts as not known.
 OPEN = 2 * UNKNOWN  # s

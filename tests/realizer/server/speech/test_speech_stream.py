@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from bml_schema import AudioFile, Speech, write
-from realizer.server.speech.speech_chunks import Chunk
 from realizer.server.speech.speech_stream import SpeechStream
+from realizer.spoken_block import Chunk
 
 
 def turn(text: str = "", *, close: bool = False) -> SpeechStream:

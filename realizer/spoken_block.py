@@ -1,4 +1,4 @@
-"""Conversion of chunks of text, with syncs, SSML and behaviours, to blocks."""
+"""Blocks that speak a text with syncs, SSML and behaviours, or a sound clip."""
 
 import re
 from collections.abc import Mapping
@@ -11,8 +11,8 @@ from bml_schema.errors import PARSING_FAILURE, Problem, did_you_mean, quoted
 from bml_schema.escape import sanitized
 from bml_schema.nodes import BMLA, BMLT, CORE, OWN, SSML
 from realizer.behaviours.registry import VOCABULARY
-from realizer.server.speech.sentence_splitter import TAG
 from realizer.speech.ssml import EMPTY, PLAIN, SPOKEN
+from realizer.text.parts import ANY_TAG as TAG
 
 ATTRIBUTE = re.compile(r"([\w:.-]+)\s*=\s*(\"[^\"]*\"|'[^']*')")
 # A tag without its ">", or with an open quote; groups: name, attributes.

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, write
-from realizer.server.speech.speech_chunks import Chunk, clip_block, text_block
+from realizer.spoken_block import Chunk, clip_block, text_block
 
 PIECE = Chunk("turn", 2)
 
