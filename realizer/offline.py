@@ -41,15 +41,17 @@ def realize(
     grace: float = 0.5,
     max_planning: int = DEFAULTS.max_planning,
     strict_bml: bool = False,
+    plain: bool = False,
 ) -> Realization:
     """Play documents or texts from start to end, without a clock.
 
     Args:
         source: BML, a text to speak, a file, or a list of these, which are submitted at 0 s, in order. A
             word that ends in .bml, .xml or .txt or holds a path separator is the name of a file; any other
-            string, or bytes, without "<" are spoken. A sound file is played; the lips follow it. Without
-            `media`, documents find their files in their own folder.
+            string, or bytes, that begin no document are spoken, as `spoken_text` reads them. A sound file
+            is played; the lips follow it. Without `media`, documents find their files in their own folder.
         voice: a voice or its name; None for espeak-ng, or the silent voice if that is not installed.
+        plain: whether a text is spoken sign by sign, without Markdown, stage directions and the like.
         face, deformer, fps, scene, seed, idle, liveliness, language, media, expressions, cooccurrence,
             prosody, jaw, lips, mapping, grace, max_planning, strict_bml: as in
             `realizer.core.options.PlayOptions`.
@@ -82,7 +84,7 @@ def realize(
         max_planning=max_planning,
         strict_bml=strict_bml,
     )
-    documents = documents_of(source)
+    documents = documents_of(source, language=language, plain=plain)
     options = replace(options, media=options.media or folder_of(document.file for document in documents))
     played = pipeline.play([document.bml for document in documents], options, _checked(voice))
     if not played.schedules:

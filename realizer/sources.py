@@ -1,19 +1,26 @@
 """Sources of documents: BML, a text to speak, a file, or several of these."""
 
+import codecs
 import errno
 import os
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from bml_schema import CORE, Block, BMLError, Speech, read, write
-from bml_schema.behaviours import SpeechText
+from bml_schema import CORE, BMLError, Speech, read, write
 from bml_schema.element_reader import Vocabulary
+from bml_schema.encodings import decode, without_controls
 from bml_schema.nodes import BMLT
+from realizer.behaviours.speech import UNSAID
 from realizer.core.sound_formats import SUFFIXES as SOUNDS
 from realizer.core.sound_formats import format_of
+from realizer.spoken_block import Chunk, text_block
+from realizer.text.marks import element_names
+from realizer.text.parts import Part, markup
+from realizer.text.spoken import SpokenText, spoken_text
 
 Source = str | bytes | Path
 # Suffixes of documents. A text in a .txt file is spoken; those of timelines are read by `check`.
@@ -25,6 +32,9 @@ _PIECE = re.compile(
     r"\S(?:.{0,9998}(?:[.!?…](?=\s|\Z)|[。！？])|.{0,9999}(?=\s|\Z)|.{0,9999})",
     re.DOTALL,
 )
+# What begins a document: an element that is neither SSML nor HTML inside of a text, or <bml> anywhere.
+_BEGINNING = re.compile(r"[\s\ufeff]*<(?:[?!]|(?:[\w.-]+:)?([A-Za-z_][\w.-]*)(?=[\s/>]))")
+_DOCUMENT = re.compile(r"<(?:[\w.-]+:)?(?:bml|speak|act|fml-apml)[\s/>]")
 NOTHING = BMLError("wanted <bml>, or a text to speak, got nothing", line=1)
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
 
@@ -51,8 +61,23 @@ def is_file_name(text: str) -> bool:
     return (is_path or bool(Path(text).suffix)) and _is_readable(Path(text))
 
 
-def documents_of(source: Source | Iterable[Source]) -> list[Document]:
+def is_markup(text: str) -> bool:
+    """Return whether a text is BML or another document, and not words with some markup in them."""
+    begin = _BEGINNING.match(text)
+    if begin is not None and begin[1] is None:
+        return True
+    inside = begin is None or begin[1].lower() in element_names("html") | element_names("ssml")
+    return not inside or _DOCUMENT.search(text) is not None
+
+
+def documents_of(
+    source: Source | Iterable[Source], *, language: str = "en", plain: bool = False
+) -> list[Document]:
     """Return the documents of a source, in order. Texts that are spoken are appended to each other.
+
+    Args:
+        language: BCP-47 tag of texts, for their numbers.
+        plain: whether texts are spoken sign by sign, without Markdown, stage directions and the like.
 
     Raises:
         FileNotFoundError: there is no such file; OSError: it cannot be read.
@@ -60,10 +85,12 @@ def documents_of(source: Source | Iterable[Source]) -> list[Document]:
         ValueError: there is no document.
     """
     if isinstance(source, Source):
-        return [document_of(source)]
+        return [document_of(source, language=language, plain=plain)]
     if not isinstance(source, Iterable) or isinstance(source, (dict, set, bytearray, memoryview)):
         raise TypeError(f"source: wanted {WANTED}, got {_type(source)}")
-    documents = [document_of(item, number) for number, item in enumerate(source, 1)]
+    documents = [
+        document_of(item, number, language=language, plain=plain) for number, item in enumerate(source, 1)
+    ]
     if not documents:
         raise ValueError(f"source: wanted {WANTED}, got no document")
     return documents
@@ -88,14 +115,40 @@ def first_error(documents: Sequence[Document], vocabulary: Vocabulary, *, strict
     return type(error)(text, line=error.line, path=error.path, block=error.block)
 
 
-def spoken(text: str, number: int = 1) -> str:
+def spoken(text: str, number: int = 1, *, language: str = "en", plain: bool = False) -> str:
     """Return the document that speaks a text after those of smaller numbers; several for a long text."""
-    blocks = []
-    for k, piece in enumerate(_PIECE.findall(text) if len(text) > LONGEST else [text]):
-        speech = Speech(id="speech", text=SpeechText(parts=(piece,)))
+    text, controls = without_controls(text)
+    said = SpokenText(text) if plain else spoken_text(text, language)
+    warnings = "; ".join(filter(None, (controls, *said.warnings)))
+    documents = []
+    for k, parts in enumerate(_divided((text,) if plain else said.parts)):
+        block = text_block(markup(parts), Chunk("speech", number))
+        remark = {UNSAID: warnings} if warnings and not k else {}
+        children = tuple(
+            replace(node, unknown_attributes=remark) if isinstance(node, Speech) else node
+            for node in block.children
+        )
         id = f"text{number}-{k + 1}" if k else f"text{number}"
-        blocks.append(write(Block(id=id, composition="APPEND", children=(speech,))))
-    return "".join(blocks)
+        documents.append(write(replace(block, id=id, composition="APPEND", children=children)))
+    return "".join(documents)
+
+
+def _divided(parts: Iterable[Part]) -> Iterator[list[Part]]:
+    """Yield parts of a text of at most LONGEST characters, divided at ends of sentences."""
+    found: list[Part] = []
+    length = 0
+    for part in parts:
+        if isinstance(part, str) and length + len(part) > LONGEST:
+            for piece in _PIECE.findall(part):
+                if found and length + len(piece) > LONGEST:
+                    yield found
+                    found, length = [], 0
+                found.append(piece)
+                length += len(piece)
+        else:
+            found.append(part)
+            length += len(part) if isinstance(part, str) else 0
+    yield found
 
 
 def recorded(file: str, number: int = 1) -> str:
@@ -105,8 +158,15 @@ def recorded(file: str, number: int = 1) -> str:
     return f'<bml xmlns="{CORE}" id="text{number}" composition="APPEND">{speech}</bml>'
 
 
-def document_of(item: object, number: int = 1) -> Document:
-    """Return the document of one source; `number` is its place among several. Errors as `documents_of`."""
+def document_of(item: object, number: int = 1, *, language: str = "en", plain: bool = False) -> Document:
+    """Return the document of one source; `number` is its place among several, the rest as `documents_of`."""
+
+    def of_text(content: str | bytes) -> str | bytes:
+        text = content if isinstance(content, str) else text_in(content)
+        if text is None or not text.strip() or is_markup(text):
+            return content
+        return spoken(text, number, language=language, plain=plain)
+
     if not isinstance(item, Source):
         raise TypeError(f"source: wanted {WANTED}, got {_type(item)}")
     if isinstance(item, str) and is_file_name(item):
@@ -120,8 +180,8 @@ def document_of(item: object, number: int = 1) -> Document:
         content, is_text = item.read_bytes(), item.suffix.lower() == ".txt"
         if format_of(content):  # with another suffix
             return Document(recorded(item.name, number), str(item))
-        return Document(_bml(content, number) if is_text else content, str(item))
-    return Document(_bml(item, number), "")
+        return Document(of_text(content) if is_text else content, str(item))
+    return Document(of_text(item), "")
 
 
 def _is_readable(path: Path) -> bool:
@@ -132,13 +192,16 @@ def _is_readable(path: Path) -> bool:
         return False
 
 
-def _bml(content: str | bytes, number: int) -> str | bytes:
-    """Return the document that speaks a text; BML, blanks and other bytes stay as they are."""
+def text_in(content: bytes) -> str | None:
+    """Return the text of bytes in UTF-8, UTF-16 or Windows-1252; None if they are none."""
+    for pair, encoding in ((content[1::2], "utf-16-le"), (content[::2], "utf-16-be")):
+        if content and 2 * pair.count(0) > len(pair):  # most letters have such a byte
+            mark = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+            return content.decode("utf-16" if mark else encoding, "replace")
     try:
-        text = content if isinstance(content, str) else content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content
-    return spoken(text, number) if text.strip() and "<" not in text else content
+        return decode(content)[0]
+    except BMLError:
+        return None
 
 
 def _type(value: object) -> str:

@@ -8,7 +8,7 @@ from xml.sax.saxutils import escape, quoteattr
 import numpy as np
 
 from bml_schema import AudioFile, Speech, Sync
-from bml_schema.nodes import LANGUAGE, SSML
+from bml_schema.nodes import LANGUAGE, OWN, SSML
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, claiming
 from realizer.core.array_types import Float64
@@ -16,6 +16,8 @@ from realizer.core.errors import RealizerError
 from realizer.scheduling.timing import Timing
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
+# An attribute of <speech>: sentences about what of a text is not in its words.
+UNSAID = f"{{{OWN}}}unsaid"
 # Stiffness of a second of speech, which is that of a stiff gap of the face; shorter gaps are stiffer.
 STIFFNESS = 1000.0
 MIN_GAP = 0.01  # s; limits the stiffness of very short gaps
@@ -142,6 +144,8 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         )
     else:
         unsaid = context.utterances[node.id].warnings if node.id in context.utterances else ()
+        if left_out := node.unknown_attributes.get(UNSAID):
+            unsaid = (left_out, *unsaid)
         if unsaid:
             words = f"speech: {'; '.join(unsaid)}"
             faults = (*faults, Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", words))

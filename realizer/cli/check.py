@@ -89,7 +89,7 @@ def check(
     chosen, lists = inputs.settings(documents, **flags), words_for(flags["language"], words)
     faults = 0
     warned: set[str] = set()
-    for name, text in zip(documents, inputs.read_documents(documents), strict=True):
+    for name, text in zip(documents, inputs.read_documents(documents, chosen.language), strict=True):
         if Path(name).suffix.lower() in SUFFIXES and isinstance(text, bytes):
             faults += _check_timeline(name, text, chosen.expressions, who, limit)
             continue

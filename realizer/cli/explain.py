@@ -38,7 +38,7 @@ def explain(
 
     inputs.check_suffix(output, ".html", *WRITERS)
     chosen = inputs.settings(documents, **flags)
-    texts = inputs.read_documents(documents)
+    texts = inputs.read_documents(documents, chosen.language)
     from realizer import pipeline
     from realizer.explained import as_html, as_picture, as_text, steps_of
     from realizer.result import Realization

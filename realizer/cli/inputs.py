@@ -90,14 +90,26 @@ def read_scene(path: str | Path | None) -> dict[str, Position] | None:
         return parse_scene(Path(path).read_text("utf-8"))
 
 
-def read_documents(names: Iterable[str]) -> list[str | bytes]:
-    """Return every document: `-` is standard input, and a text without "<" that names no file is spoken."""
+def read_documents(
+    names: Iterable[str], language: str | None = None, *, plain: bool = False
+) -> list[str | bytes]:
+    """Return every document: `-` is standard input, and a text that names no file is spoken.
+
+    Args:
+        language: BCP-47 tag of texts; None: of the settings.
+        plain: whether they are spoken sign by sign.
+    """
     from realizer.sources import document_of
 
     texts: list[str | bytes] = []
+    chosen = language or settings().language
     for number, name in enumerate(names, 1):
         with opening(name), reporting(ValueError, f"{name!r}: "):
-            texts.append(document_of(read_file(name) if name == "-" else name, number).bml)
+            texts.append(
+                document_of(
+                    read_file(name) if name == "-" else name, number, language=chosen, plain=plain
+                ).bml
+            )
     return texts
 
 

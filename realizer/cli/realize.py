@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -64,8 +65,13 @@ output_options = options.several(
 
 @click.command()
 @options.documents
+@option(
+    "--plain",
+    "Speak a TEXT sign by sign, without Markdown, stage directions and the like.",
+    is_flag=True,
+)
 @output_options
-def realize(documents: tuple[str, ...], **flags: Any) -> int:
+def realize(documents: tuple[str, ...], plain: bool, **flags: Any) -> int:
     """Play documents without a clock, to a film, picture, sound or animation data.
 
     \b
@@ -75,10 +81,12 @@ def realize(documents: tuple[str, ...], **flags: Any) -> int:
     realizer realize recording.wav -o recording.mp4
 
     Several documents are submitted at 0 s, in order; their composition attributes apply. A TEXT is spoken:
-    anything without "<" that names no file and is no single word with a path separator or the end of one.
-    The lips follow a recording.
+    anything that begins no document, names no file and is no single word with a path separator or the end
+    of one. Markdown, SSML, stage directions and numbers in it are read as people mean them. The lips follow
+    a recording.
     """
-    return play_documents(lambda: inputs.read_documents(documents), flags, documents)
+    read = partial(inputs.read_documents, documents, flags["language"], plain=plain)
+    return play_documents(read, flags, documents)
 
 
 def play_documents(
@@ -200,7 +208,7 @@ def schedule(
             chart_writer_for(plot)
     chosen = inputs.settings(documents, **flags)
     player = inputs.planning_player(chosen, chosen.scene)
-    texts = inputs.read_documents(documents)
+    texts = inputs.read_documents(documents, chosen.language)
     accepted, refused = plan(texts, player, chosen.voice)
     if len(accepted) > 1:  # conflicts of blocks are settled when they start
         player.manager.advance(inf)

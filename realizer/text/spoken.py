@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import chain
 from typing import Literal, NamedTuple
 
-from realizer.text.parts import markup, tidy
+from realizer.text.parts import Part, markup, tidy
 from realizer.text.stream import TextStream
 
 SLICE = 4096  # characters that are read at a time: what is left to read is copied for each line
@@ -24,9 +24,11 @@ class SpokenText(str):
     Attributes:
         behaviours: what marks and elements in the text show, and where.
         markup: the words with SSML and behaviours, as `speech.append` takes them with `plain`.
+        parts: the words, and the tags between them.
         warnings: sentences about what is left out.
     """
 
+    parts: tuple[Part, ...] = ()
     behaviours: tuple[PlacedBehaviour, ...] = ()
     markup: str = ""
     warnings: tuple[str, ...] = ()
@@ -67,6 +69,7 @@ def spoken_text(
             behaviours.append(PlacedBehaviour(len(words), part.source))
     spoken = SpokenText(words)
     spoken.behaviours = tuple(behaviours)
+    spoken.parts = tuple(parts)
     spoken.markup = markup(parts)
     spoken.warnings = tuple(dict.fromkeys(stream.warnings))
     return spoken

@@ -24,7 +24,7 @@ NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
 def test_realize_has_the_options_of_playing_with_their_defaults() -> None:
     parameters = inspect.signature(realize).parameters
-    options = {name: p.default for name, p in parameters.items() if name not in ("source", "voice")}
+    options = {name: p.default for name, p in parameters.items() if name not in ("source", "voice", "plain")}
     assert options == {f.name: f.default for f in fields(PlayOptions)}
 
 
@@ -92,7 +92,7 @@ def test_realize_speaks_a_text(tmp_path: Path) -> None:
     assert realize(tmp_path / "x.bml").schedules[0].block == "b"
 
 
-@pytest.mark.parametrize("source", ["<bml/>", "", ["<bml id='b'><oops", "<bml/>"], b"\xff"])
+@pytest.mark.parametrize("source", ["<bml/>", "", ["<bml id='b'><oops", "<bml/>"], b"\x89\x01\0"])
 def test_realize_refuses_a_source_without_a_document(source: str | bytes | list[str]) -> None:
     with pytest.raises(BMLError) as error:
         realize(source)

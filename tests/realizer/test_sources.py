@@ -6,7 +6,8 @@ import pytest
 
 from bml_schema import Block, BMLError, Speech, parse, read
 from realizer.behaviours.registry import VOCABULARY
-from realizer.sources import documents_of, first_error, folder_of, is_file_name
+from realizer.behaviours.speech import UNSAID
+from realizer.sources import documents_of, first_error, folder_of, is_file_name, is_markup
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -45,10 +46,12 @@ def test_is_file_name_of_a_file_with_any_suffix(tmp_path: Path, monkeypatch: pyt
     assert not is_file_name("Hello")
 
 
-@pytest.mark.parametrize("source", ["Tom & Jerry, 1 > 0?", b"Tom & Jerry, 1 > 0?"])
+@pytest.mark.parametrize("source", ["Tom & Jerry, *you* > 0?", b"Tom & Jerry, *you* > 0?"])
 def test_documents_of_a_text_speak_it(source: str | bytes) -> None:
     (document,) = documents_of(source)
-    assert text_of(document.bml) == "Tom & Jerry, 1 > 0?"
+    assert text_of(document.bml) == "Tom & Jerry, you more than 0?"
+    (document,) = documents_of(source, plain=True)
+    assert text_of(document.bml) == "Tom & Jerry, *you* > 0?"
 
 
 def test_documents_of_a_long_text_speak_all_of_it_in_parts() -> None:
@@ -107,9 +110,57 @@ def test_documents_of_an_empty_list_are_an_error() -> None:
         documents_of([])
 
 
-def test_documents_of_a_text_refuse_characters_that_xml_cannot_hold() -> None:
-    with pytest.raises(ValueError, match=r"U\+0001 at 1"):
-        documents_of("a\x01b")
+def test_documents_of_a_text_name_characters_that_xml_cannot_hold() -> None:
+    block = parse(documents_of("A\x01 page\fthen\vthis.")[0].bml, VOCABULARY)
+    (speech,) = block.behaviours
+    assert isinstance(speech, Speech)
+    assert str(speech.text) == "A page then this."
+    assert "U+0001" in speech.unknown_attributes[UNSAID]
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])
+def test_documents_of_a_text_file_are_read_in_its_encoding(tmp_path: Path, encoding: str) -> None:
+    (tmp_path / "a.txt").write_bytes("Grüße: “ja”, 5 €.".encode(encoding))
+    (document,) = documents_of(tmp_path / "a.txt", language="de")
+    assert text_of(document.bml) == "Grüße: “ja”, fünf Euro."
+
+
+@pytest.mark.parametrize(
+    ("text", "is_document"),
+    [
+        ("5 < 6", False),
+        ("I <3 you", False),
+        ("<3", False),
+        ("It costs < 5 dollars & more.", False),
+        ("See <https://x.org>.", False),
+        ("<https://x.org> is it", False),
+        ("That is <emphasis>really</emphasis> kind", False),
+        ("<b>Important</b>", False),
+        ("<emphasis>Hi</emphasis>", False),
+        ("<bml id='b'/>", True),
+        ("\ufeff <!-- one --> <bml id='b'/>", True),
+        ("<?xml version='1.0'?><bml/>", True),
+        ("Here it is: <bml id='b'/>", True),
+        ("<speak>Hi</speak>", True),
+        ("<head id='h' lexeme='NOD'/>", True),
+    ],
+)
+def test_is_markup_of_documents_only(text: str, is_document: bool) -> None:
+    assert is_markup(text) is is_document
+
+
+def test_marks_of_a_text_are_behaviours_of_its_document() -> None:
+    block = parse(documents_of("Well [nod] *smiles* yes :)\n\n```\ncode\n```")[0].bml, VOCABULARY)
+    assert [type(node).__name__ for node in block.behaviours] == [
+        "Speech",
+        "Head",
+        "FaceLexeme",
+        "FaceLexeme",
+    ]
+    assert [str(node.syncs["start"]) for node in block.behaviours[1:]] == [
+        "speech:at-1-1 + 0", "speech:at-1-2 + 0", "speech:at-1-3 + 0"
+    ]  # fmt: skip
+    assert "a block of code is not spoken" in block.behaviours[0].unknown_attributes[UNSAID]
 
 
 def test_first_error_has_the_line_the_path_and_the_file(tmp_path: Path) -> None:
