@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any, Unpack
 
 from bml_schema.feedback import BlockProgress, Feedback
-from realizer.client.block_waiters import BlockWaiter, BlockWaiters, is_control
+from realizer.client.block_waiters import BlockEnd, BlockWaiter, BlockWaiters, is_control
 from realizer.client.connection import Connection, address_of
 from realizer.client.errors import ClientError, ClosedError
 from realizer.client.message_router import Frame
 from realizer.client.speech import Speech
 from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
 from realizer.client.subscriptions import play_out, take, take_subscribed
-from realizer.client.voice import Pcm, Timed, Voice, content_of, timed
+from realizer.client.voice import OnWord, Pcm, Timed, Voice, content_of, timed
 from realizer.protocol.streams import STREAMS
 from realizer.protocol.wire import ArkitFrame, AUFrame, FapFrame, MeshFrame, PictureFrame, SoundFrame
 
@@ -48,8 +48,13 @@ class Client:
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """Errors about messages that have no answer."""
+        """Errors that no method raises, such as those of a stream of pictures that ended."""
         return list(self._router.errors)
+
+    @property
+    def left_out(self) -> Mapping[str, int]:
+        """Stream -> number of frames that `faps`, `aus` and `arkit` left out, as they were long past."""
+        return self._router.left_out
 
     async def send(self, bml: str) -> None:
         """Send one or more BML documents.
@@ -61,19 +66,20 @@ class Client:
         await self._connection.post(bml)
 
     async def control(self, /, type: str, **fields: Any) -> None:
-        """Send a control message that has no answer, such as `stop` or `scene`; see `errors`.
+        """Send a control message, such as `stop` or `scene`, and wait until the service has taken it.
 
         Raises:
-            ClientError: the connection has ended.
+            ClientError: the service refused it, or the connection has ended.
         """
-        await self._connection.control(type, **fields)
+        await self._connection.ask(type, **fields)
 
     async def ask(self, /, type: str, **fields: Any) -> dict[str, Any]:
-        """Send a control message and wait for its answer: hello, subscribe, state, ping.
+        """Send a control message and return its answer: to hello, subscribe, state, ping, save.
+
+        Others have none: an empty dictionary is returned once the service has taken them.
 
         Raises:
-            ClientError: the service answered with an error.
-            ValueError: such a message has no answer.
+            ClientError: the service answered with an error, or the connection has ended.
         """
         return await self._connection.ask(type, **fields)
 
@@ -89,8 +95,11 @@ class Client:
         """Return the state of the session: its blocks, and the action units with their sources."""
         return await self.ask("state")
 
-    async def play(self, bml: str) -> BlockProgress:
+    async def play(self, bml: str) -> BlockEnd:
         """Send BML, wait for the end of its last block, and return that.
+
+        Its `warnings` say what was dropped or changed, and `shown` is False if nothing was heard or moved
+        though something was asked for. Both are logged, too.
 
         Raises:
             ClientError: the block was refused, or the connection ended.
@@ -130,12 +139,19 @@ class Client:
             id: id of the speech and of its block; other blocks refer to a sync of its text as `ID:ID:sync`.
             opening: composition, character and language, as in the message `speech`.
         """
-        speech = Speech(id, opening, self.control, self.wait_for, self._connection.check)
+        speech = Speech(id, opening, self._connection.control, self.wait_for, self._connection.check)
         speech.earlier, self._speeches[id] = self._speeches.get(id), speech
         self._router.waiters.add(speech.progress)
         return speech
 
-    def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> Voice:
+    def voice(
+        self,
+        *,
+        rate: int,
+        language: str | None = None,
+        on_word: OnWord | None = None,
+        **opening: Unpack[SpeechOptions],
+    ) -> Voice:
         """Return a speech whose sound is sent as it comes: write(pcm), words([...]), close(), ended().
 
         Without words, lips follow the sound.
@@ -143,9 +159,11 @@ class Client:
         Args:
             rate: samples a second.
             language: BCP-47 tag of the words; None: the service's.
+            on_word: called with each word when it is spoken: start, end, text as given, and `time` on the
+                session clock.
         """
         fields = opening if language is None else {**opening, "language": language}
-        voice = Voice(rate, fields, self._connection.post, self.control, self.wait_for)
+        voice = Voice(rate, fields, self._connection.post, self._connection.control, self.wait_for, on_word)
         self._router.waiters.add(voice.progress)
         return voice
 
@@ -159,8 +177,9 @@ class Client:
         visemes: Iterable[Timed] | None = None,
         language: str | None = None,
         viseme_set: str = "oculus",
+        on_word: OnWord | None = None,
         **opening: Unpack[SpeechOptions],
-    ) -> BlockProgress:
+    ) -> BlockEnd:
         """Play the sound of any other voice, and return its end; `said` are the words, if it was cut off.
 
         Without words, phonemes and visemes, lips follow the text, or the sound alone.
@@ -169,20 +188,23 @@ class Client:
             sound: a WAV, FLAC, MP3, Ogg or WebM file; with `rate` mono PCM: int16, or floats from -1 to 1.
             rate: samples a second of PCM.
             text: what is said.
-            words, phonemes, visemes: (seconds, text) or (start, end, text) of each; phonemes in IPA.
+            words, phonemes, visemes: (seconds, text), (start, end, text) or a dictionary with start, end and
+                text of each; phonemes in IPA.
             language: BCP-47 tag of the text and the words; None: the service's.
             viseme_set: oculus, mpeg4, sapi or polly.
+            on_word: as of `voice`.
 
         Raises:
             TypeError, ValueError: an argument has another form.
             ClientError: the service refuses it, or the connection has ended.
         """
         content = content_of(sound, rate)
-        voice = self.voice(rate=1 if rate is None else rate, language=language, **opening)
+        voice = self.voice(rate=1 if rate is None else rate, language=language, on_word=on_word, **opening)
         lists = {"words": words, "phonemes": phonemes, "visemes": visemes}
         described: dict[str, Any] = {name: timed(name, v) for name, v in lists.items() if v is not None}
         described |= {"text": text} if text is not None else {}
         described |= {"viseme_set": viseme_set} if visemes is not None else {}
+        voice.expect_words(described.get("words", []))
         await voice.clip(content, rate or 0, close=True, **described)
         return await voice.ended()
 

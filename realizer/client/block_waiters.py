@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
 from itertools import repeat
 from typing import Any
 
@@ -21,6 +22,17 @@ NO_ID = "<no id>"  # of warnings about documents whose block has no usable id
 # The id here of a block that gets one from the service, and the form of those ids.
 _MADE, _MADE_IDS = "unnamed0", re.compile(r"unnamed\d+")
 _NO_DOCUMENT = "wanted <bml>, got"  # words of the error about text between documents
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockEnd(BlockProgress):
+    """The end of a block that was played.
+
+    Attributes:
+        warnings: those about the block and its behaviours, in order.
+    """
+
+    warnings: tuple[WarningFeedback, ...] = field(default=(), compare=False)
 
 
 class BlockWaiter:
@@ -50,6 +62,7 @@ class BlockWaiter:
         self.start: float | None = None
         self.last: BlockProgress | WarningFeedback | None = None
         self.fault: dict[str, Any] | None = None
+        self.warnings: list[WarningFeedback] = []
         self._may_lack_id = may_lack_id
 
     @property
@@ -84,15 +97,16 @@ class BlockWaiter:
         """Handle an error about a message without an answer. Return whether it is about this block."""
         return False
 
-    def end(self) -> BlockProgress:
-        """Return the feedback at the end of the block.
+    def end(self) -> BlockEnd:
+        """Return the feedback at the end of the block, with the warnings about it.
 
         Raises:
             ClientError: the block was refused, or its end is not known.
         """
         self.check()
         if isinstance(self.last, BlockProgress):
-            return self.last
+            values = {f.name: getattr(self.last, f.name) for f in fields(BlockProgress)}
+            return BlockEnd(**values, warnings=tuple(self.warnings))
         assert self.last is not None
         raise ClientError(f"{self.last.id}: {self.last.text}", "refused")
 
@@ -155,7 +169,11 @@ class BlockWaiters:
                 block = id.partition(":")[0].rpartition(".")[0]  # speech s is spoken in blocks s.1, s.2 ...
                 for waiter in self._reached(block):
                     waiter.on_sync_point(feedback)
-            case WarningFeedback():
+            case WarningFeedback(id=id):
+                block = id.partition(":")[0]
+                if feedback.in_use_for in (None, self.connection):
+                    for waiter in self._reached(block) or self._reached(block.rpartition(".")[0]):
+                        waiter.warnings.append(feedback)
                 self._refuse(feedback)
             case PredictionFeedback(blocks=blocks):
                 for prediction in blocks:

@@ -16,7 +16,7 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 from realizer.client.block_waiters import BlockWaiter
 from realizer.client.errors import ClientError, ClosedError, LostError
 from realizer.client.message_router import Router
-from realizer.protocol.messages.common import ANSWERS, PROTOCOL
+from realizer.protocol.messages.common import PROTOCOL
 
 # Pauses before attempts to connect again, each twice as long as the last, and how long attempts go on.
 PAUSE, LONGEST_PAUSE = 0.25, 4.0  # s
@@ -50,8 +50,7 @@ class Connection:
         self._received = asyncio.Condition()
         self._end: ClientError | None = None  # why nothing more comes
         self._reader: asyncio.Task[None] | None = None
-        self._request_lock = asyncio.Lock()
-        self._request: str | None = None  # a message that was sent and is not answered
+        self._asking = asyncio.Lock()  # requests wait in the order in which they are sent
         # stream, character and view -> the message
         self._subscriptions: dict[tuple[Any, ...], str] = {}
         self._interrupted: list[BlockWaiter] = []  # what was waited for when the connection was lost
@@ -86,22 +85,27 @@ class Connection:
         await self.post(json.dumps({"type": type, **fields}))
 
     async def ask(self, type: str, **fields: Any) -> dict[str, Any]:
-        """Send a control message and wait for its answer. Errors as of `Client.ask`."""
-        if type not in ANSWERS:
-            raise ValueError(f"wanted one of {', '.join(ANSWERS)}, which are answered; got {type}")
-        message = json.dumps({"type": type, **fields})
-        async with self._request_lock:
-            self.router.expect_answer(type)
-            await self.post(message)
-            self._request = message
+        """Send a control message and wait for its answer, or until it is taken. Errors as of `Client.ask`."""
+        if type == "unsubscribe":
+            self._subscriptions.pop(_key(fields), None)
+        requests = self.router.requests
+        async with self._asking:
+            request = requests.add(type, fields)
             try:
-                await self.wait_for(lambda: self.router.has_answer)
-            finally:
-                self._request = None
-            answer = self.router.answer()
+                for text in request.texts:
+                    await self.post(text)
+            except BaseException:
+                if request in requests.waiting:
+                    requests.waiting.remove(request)
+                raise
+            request.is_sent = True
+        await self.wait_for(lambda: request.reply is not None)
+        assert request.reply is not None
+        if request.reply["type"] == "error":
+            raise ClientError.of(request.reply)
         if type == "subscribe":
-            self._subscriptions[_key(fields)] = message
-        return answer
+            self._subscriptions[_key(fields)] = request.texts[0]
+        return {} if request.mark else request.reply
 
     async def wait_for(self, condition: Callable[[], bool]) -> None:
         """Wait until a condition holds. It is checked after each message of the service.
@@ -165,6 +169,7 @@ class Connection:
         """
         _LOG.warning("%s: connecting again", lost)
         self._interrupted = self.router.waiters.on_lost()
+        self.router.requests.on_lost()
         await self._notify()
         session, pause, until = self.router.welcome["session"], PAUSE, time.monotonic() + PATIENCE
         while True:
@@ -194,7 +199,8 @@ class Connection:
                     self.router.receive(message)
                 self.router.on_return(self._interrupted)
                 self._socket, self._is_open = socket, True
-                for text in ([self._request] if self._request else []) + [*self._subscriptions.values()]:
+                again = [r.texts[0] for r in self.router.requests.waiting if r.is_sent]
+                for text in (*again, *self._subscriptions.values()):
                     await socket.send(text)
         except BaseException:
             self._is_open = False

@@ -1,18 +1,18 @@
-"""The router of the service's messages to queues, answers, listeners and receivers; it has no sockets."""
+"""The router of the service's messages to queues, requests, waiters and receivers; it has no sockets."""
 
 import json
 import logging
 import math
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
-from bml_schema.feedback import Feedback, WarningFeedback, parse_feedback
+from bml_schema.feedback import BlockProgress, Feedback, WarningFeedback, parse_feedback
 from realizer.client.block_waiters import BlockWaiter, BlockWaiters, waiters_of
+from realizer.client.control_requests import ControlRequests
 from realizer.client.errors import ClientError
-from realizer.protocol.messages.common import ANSWERS
 from realizer.protocol.streams import JSON_STREAMS
 from realizer.protocol.wire import WireFrame, unpack
 
@@ -41,12 +41,14 @@ class Arrivals:
 
 
 class Router:
-    """The queues of messages that have arrived, and the pending request.
+    """The queues of messages that have arrived, and what waits for some.
 
     Attributes:
         receivers: (stream, the character in `subscribe`) -> what its binary frames go to instead of a queue.
-        errors: errors about messages without an answer, and of video streams that ended.
+        errors: errors about nothing that waits, such as a part of a speech, and of video streams that ended.
+        requests: the control messages that wait for their answers.
         waiters: of the blocks and speeches that were sent and have not ended.
+        left_out: stream -> number of frames that an iteration was too late for.
         last_sent: the waiter for the last block of the last text.
         feedback: that was not taken, and an error where some is missing.
         welcome: the last one.
@@ -62,8 +64,8 @@ class Router:
         self.errors: deque[dict[str, Any]] = deque(maxlen=MAX_FRAMES)
         self.waiters = BlockWaiters()
         self.last_sent: BlockWaiter | None = None
-        self._request: str | None = None
-        self._answer: dict[str, Any] | None = None
+        self.requests = ControlRequests()
+        self.left_out = Counter[str]()
         self._streams: dict[tuple[str, int], dict[str, Any]] = {}  # stream, index -> its description
 
     def receive(self, message: str | bytes) -> None:
@@ -88,6 +90,8 @@ class Router:
             self.seen = feedback.seq or self.seen
             if isinstance(feedback, WarningFeedback):
                 _LOG.warning("%s: %s: %s", feedback.id, feedback.type, feedback.text)
+            elif isinstance(feedback, BlockProgress) and not feedback.shown:
+                _LOG.warning("%s: nothing of it was heard or moved", feedback.id.removesuffix(":end"))
             self.waiters.on_feedback(feedback)
 
     def on_sent(self, bml: str) -> BlockWaiter | None:
@@ -133,22 +137,7 @@ class Router:
         """Return the newest messages of a stream; all of `schedule`, as each is the difference to others."""
         return self.frames.setdefault(stream, deque(maxlen=None if stream == "schedule" else MAX_FRAMES))
 
-    def expect_answer(self, type: str) -> None:
-        """Keep the next answer to a message of that type for `answer`."""
-        self._request, self._answer = type, None
-
-    @property
-    def has_answer(self) -> bool:
-        return self._answer is not None
-
-    def answer(self) -> dict[str, Any]:
-        assert self._answer is not None
-        if self._answer["type"] == "error":
-            raise ClientError.of(self._answer)
-        return self._answer
-
     def _reply(self, reply: dict[str, Any]) -> None:
-        request = self._request
         if reply["type"] == "welcome":
             self.welcome, self.seen = reply, reply["seq"]
             self.waiters.connection = reply.get("connection")
@@ -156,17 +145,9 @@ class Router:
             key = reply["stream"], reply.get("index", 0)
             known = self._streams.get(key, {}) if reply["type"] == "changed" else {}
             self._streams[key] = known | reply
-        if reply["type"] == "error":
-            # Without `where` it is about a text that could not be parsed.
-            where = reply.get("where", f"{request}").partition(".")[0]
-            # An older service does not know the type of the request.
-            unknown = where == "type" and reply["message"].endswith(f"got {json.dumps(request)}")
-            is_answer = where == request or unknown
-        else:
-            is_answer = request is not None and reply["type"] == ANSWERS.get(request)
-        if is_answer and request is not None:
-            self._request, self._answer = None, reply
-        elif reply["type"] in ("error", "gap"):
+        if self.requests.on_reply(reply) is not None:
+            return
+        if reply["type"] in ("error", "gap"):
             # Each message of a refused speech causes the same error.
             is_repeated = bool(self.errors) and self.errors[-1] == reply
             self.errors.append(reply)
@@ -175,24 +156,29 @@ class Router:
             self.waiters.on_error(reply)
 
 
-# A consumer that is slower than the frames loses the oldest ones.
+# Of frames that are not due yet, the oldest ones are lost beyond this number.
 MAX_WAITING = 1_000
 # The session clock is estimated from the messages of so many seconds.
 MEMORY = 5.0  # s
+LATE = 0.1  # s; of frames that are due for longer only the newest one is taken
+GAP = 0.5  # s without a message, in which the program stood still: what it knew of the clock is no older
 
 
 class Playout:
     """A queue of the frames of one stream, each of which is due at its time on the session clock.
 
     The session clock is estimated from the messages that took the least time: the service sends their last
-    frame `ahead` seconds before its time.
+    frame `ahead` seconds before its time. A program that is slower than the frames, or stood still, gets the
+    newest one that is due; `left_out` counts the others.
 
     Args:
         ahead: as in `subscribe`.
     """
 
     def __init__(self, ahead: float) -> None:
+        self.left_out = 0  # frames that were long past
         self._ahead = ahead
+        self._heard = -math.inf  # when the last message arrived
         self._frames: deque[WireFrame[Any]] = deque(maxlen=MAX_WAITING)
         self._next = 0  # number of the first frame that was not taken
         # (arrival, offset) of messages, the offsets rising: the first is the least of those remembered.
@@ -208,6 +194,10 @@ class Playout:
         while self._frames and self._frames[-1].frame >= message.frame:
             self._frames.pop()
         self._frames.extend(frame for frame in frames if frame.frame >= self._next)
+        gap = now - self._heard
+        if GAP < gap < math.inf:
+            self._offsets = deque((arrival + gap, offset) for arrival, offset in self._offsets)
+        self._heard = now
         offset = now - (frames[-1].time - self._ahead)
         while self._offsets and self._offsets[0][0] < now - MEMORY:
             self._offsets.popleft()
@@ -220,6 +210,7 @@ class Playout:
         self._frames.clear()
         self._offsets.clear()
         self._next = 0
+        self._heard = -math.inf
 
     @property
     def next_due(self) -> float:
@@ -227,9 +218,13 @@ class Playout:
         return self._frames[0].time + self._offsets[0][1] if self._frames else math.inf
 
     def take(self, now: float) -> WireFrame[Any] | None:
-        """Return the next frame if it is due."""
+        """Return the next frame if it is due; of frames long past, the newest one."""
         if self.next_due > now:
             return None
+        if self.next_due < now - LATE:
+            while len(self._frames) > 1 and self._frames[1].time + self._offsets[0][1] <= now:
+                self._frames.popleft()
+                self.left_out += 1
         frame = self._frames.popleft()
         self._next = frame.frame + 1
         return frame

@@ -2,12 +2,13 @@
 
 import asyncio
 import contextlib
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Self
 
-from bml_schema.feedback import BlockProgress, SyncPointProgress
-from realizer.client.block_waiters import BlockWaiter
+from bml_schema.feedback import SyncPointProgress
+from realizer.client.block_waiters import BlockEnd, BlockWaiter
 from realizer.client.errors import ClientError
 
 LONGEST = 20_000  # characters of one message
@@ -26,12 +27,15 @@ class SpeechProgress(BlockWaiter):
     Attributes:
         is_closed: whether its last message was sent.
         points: sync of the text -> when it was spoken, seconds on the session clock.
+        on_word: called with the index of each known word of a clip, and when it is spoken; or None.
     """
 
     def __init__(self, id: str) -> None:
         super().__init__(id)
         self.is_sent = self.is_closed = False
         self.points: dict[str, float] = {}
+        self.on_word: Callable[[int, float], None] | None = None
+        self._words = 0  # that were spoken
 
     def on_lost(self) -> None:
         if not self.is_closed:  # the service closes it
@@ -45,7 +49,11 @@ class SpeechProgress(BlockWaiter):
 
     def on_sync_point(self, feedback: SyncPointProgress) -> None:
         _, behaviour, sync = feedback.id.split(":", 2)
-        if behaviour == self.block:
+        if behaviour == self.block and re.fullmatch(r"word-\d+", sync):  # each clip counts from 1
+            self._words += 1
+            if self.on_word is not None:
+                self.on_word(self._words - 1, feedback.global_time)
+        elif behaviour == self.block:
             self.points.setdefault(sync, feedback.global_time)
 
     def on_error(self, error: dict[str, Any]) -> bool:
@@ -107,7 +115,7 @@ class OpenSpeech(ABC):
             self._closed = self._stopped = True
             await self._speech(close=True)
 
-    async def ended(self) -> BlockProgress:
+    async def ended(self) -> BlockEnd:
         """Wait for the end of the speech; if it was cut off, `said` are the words that were spoken.
 
         Raises:

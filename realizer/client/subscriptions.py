@@ -18,12 +18,18 @@ T = TypeVar("T")
 async def play_out(
     connection: Connection, stream: str, ahead: float, options: Mapping[str, Any]
 ) -> AsyncIterator[Any]:
-    """Subscribe, and yield each frame at its time. Arguments and errors as of `Client.faps`."""
+    """Subscribe, and yield each frame at its time; those long past are left out, and counted.
+
+    Arguments and errors as of `Client.faps`.
+    """
     playout = Playout(ahead)
     with contextlib.suppress(ClosedError):
         async with _subscribed(connection, stream, playout, {**options, "ahead": ahead}):
             while True:
+                before = playout.left_out
                 while (frame := playout.take(time.monotonic())) is not None:
+                    connection.router.left_out[stream] += playout.left_out - before
+                    before = playout.left_out
                     yield frame
                 due = playout.next_due
                 pause = None if due == math.inf else due - time.monotonic()

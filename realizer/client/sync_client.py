@@ -11,7 +11,7 @@ from realizer.client.async_client import Client
 from realizer.client.errors import ClosedError
 from realizer.client.speech import OpenSpeech, Speech
 from realizer.client.stream_options import SpeechOptions
-from realizer.client.voice import Voice
+from realizer.client.voice import OnWord, Voice
 
 A = TypeVar("A")
 P = ParamSpec("P")
@@ -181,16 +181,32 @@ class SyncClient(Synchronous[Client]):
 
     @property
     def errors(self) -> list[dict[str, Any]]:
-        """Errors about messages that have no answer."""
+        """Errors that no method raises."""
         return self._original.errors
 
     def speech(self, id: str, **opening: Any) -> SyncSpeech:
         """Return a speech whose text is streamed: `with client.speech("s") as speech`."""
         return SyncSpeech(self._original.speech(id, **opening), self._thread)
 
-    def voice(self, *, rate: int, language: str | None = None, **opening: Unpack[SpeechOptions]) -> SyncVoice:
-        """Return a speech whose sound is sent as it comes, as `Client.voice`."""
-        return SyncVoice(self._original.voice(rate=rate, language=language, **opening), self._thread)
+    def voice(
+        self,
+        *,
+        rate: int,
+        language: str | None = None,
+        on_word: OnWord | None = None,
+        **opening: Unpack[SpeechOptions],
+    ) -> SyncVoice:
+        """Return a speech whose sound is sent as it comes, as `Client.voice`.
+
+        `on_word` is called in the thread of the client.
+        """
+        original = self._original.voice(rate=rate, language=language, on_word=on_word, **opening)
+        return SyncVoice(original, self._thread)
+
+    @property
+    def left_out(self) -> Mapping[str, int]:
+        """As of `Client`."""
+        return self._original.left_out
 
     def close(self) -> None:
         """Close the connection. Closing again does nothing."""

@@ -1,5 +1,6 @@
 """Speech of any other voice: sound that is sent in clips, with or without the times of its words."""
 
+import logging
 import math
 import secrets
 import time
@@ -23,14 +24,22 @@ DESCRIBING = ("text", "words", "phonemes", "visemes")  # fields of `speech`
 
 Send = Callable[[bytes], Awaitable[None]]
 Pcm = bytes | bytearray | memoryview | Int16 | Float32 | Float64
-Timed = tuple[float, str] | tuple[float, float, str]
+Timed = tuple[float, str] | tuple[float, float, str] | Mapping[str, Any]
+OnWord = Callable[[dict[str, Any]], object]
+_LOG = logging.getLogger("realizer.client")
 
 
 class Voice(OpenSpeech):
     """A speech whose sound is sent as it comes, which `Client.voice` returns."""
 
     def __init__(
-        self, rate: int, opening: Mapping[str, Any], send: Send, control: Control, wait: Wait
+        self,
+        rate: int,
+        opening: Mapping[str, Any],
+        send: Send,
+        control: Control,
+        wait: Wait,
+        on_word: OnWord | None = None,
     ) -> None:
         super().__init__(f"say-{secrets.token_hex(4)}", opening, control, wait)
         self._rate = checked_rate(rate)
@@ -38,6 +47,9 @@ class Voice(OpenSpeech):
         self._sound = np.zeros(0, np.int16)  # that is not sent
         self._sent = 0  # samples
         self._words: list[dict[str, Any]] = []  # those that are not sent; times from the start of the speech
+        self._given: list[dict[str, Any]] = []  # all words
+        self._on_word = on_word
+        self.progress.on_word = self._report
         self._clips = 0
         self._began = 0.0  # when the first clip was sent, on a clock that never jumps
 
@@ -79,6 +91,7 @@ class Voice(OpenSpeech):
                 raise ValueError(f"words: wanted times from {last:.3f} s on, got {word['start']:.3f} s")
             last = word["start"]
         self._words += added
+        self._given += added
 
     async def close(self) -> None:
         if self._closed:
@@ -115,6 +128,18 @@ class Voice(OpenSpeech):
             if not (number or is_described):
                 await self._speech(clip=id, **description)
 
+    def expect_words(self, words: Iterable[dict[str, Any]]) -> None:
+        """Take the words of the next clip, of which each is reported when it is spoken."""
+        self._given += words
+
+    def _report(self, index: int, time: float) -> None:
+        """Pass on a word that is spoken. A fault of the program's function does not end the connection."""
+        if self._on_word is not None and index < len(self._given):
+            try:
+                self._on_word({**self._given[index], "time": time})
+            except Exception:
+                _LOG.exception("on_word failed")
+
     def _ready(self) -> int:
         """Return how many samples can be sent: all, or up to the start of a word that may go on."""
         if not self._words:
@@ -149,8 +174,12 @@ def timed(name: str, items: Iterable[Timed]) -> list[dict[str, Any]]:
     found = []
     for item in items:
         numbers, text = (item[:-1], item[-1]) if isinstance(item, Sequence) and item else ((), None)
+        if isinstance(item, Mapping) and item.keys() <= {"start", "end", "text"}:
+            numbers = tuple(item[n] for n in ("start", "end") if item.get(n) is not None)
+            text = item.get("text") if "start" in item else None
         if not (isinstance(text, str) and 1 <= len(numbers) <= 2 and all(map(_is_number, numbers))):
-            raise TypeError(f"{name}: wanted (seconds, text) or (start, end, text), got {item!r}")
+            wanted = "(seconds, text), (start, end, text) or a dictionary of these"
+            raise TypeError(f"{name}: wanted {wanted}, got {item!r}")
         if not all(0 <= number < math.inf for number in numbers):
             raise ValueError(f"{name}: wanted seconds from 0 on, got {item!r}")
         found.append(dict(zip(("start", "end"), map(float, numbers), strict=False)) | {"text": text})

@@ -221,7 +221,7 @@ class SpeechStreams:
             speech.shown = speech.shown or feedback.shown
             speech.on_done(block)
             speech.last_end = max(speech.last_end, feedback.global_time)
-            return feedback, frozenset()
+            return replace(feedback, shown=True), frozenset()  # the end of the speech says it for all
         chunks = frozenset(speech.open_chunks)
         speech.is_finished = feedback.status in CUT_OFF
         if speech.is_closed or not speech.is_finished:

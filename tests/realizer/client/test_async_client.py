@@ -103,7 +103,7 @@ def test_client_play_returns_the_end_of_the_block() -> None:
             end = await client.play(WAIT.format("b"))
             assert (end.id, end.status) == ("b:end", "DONE")
             # Whoever iterates gets the feedback all the same.
-            assert [f async for f in client.until_end("b")][-1] == end
+            assert [f async for f in client.until_end("b")][-1].seq == end.seq
             ends = await asyncio.gather(client.play(WAIT.format("c")), client.play(WAIT.format("d")))
             assert [end.id for end in ends] == ["c:end", "d:end"]
             with pytest.raises(ClientError, match="lexeme") as caught:
@@ -221,11 +221,20 @@ def test_client_has_the_welcome_and_the_state() -> None:
 def test_client_keeps_errors_apart_from_answers() -> None:
     async def test(url: str) -> None:
         async with connect(url) as client:
-            await client.control("set", aus={"12": 7})
-            assert (await client.ask("ping", id=1))["id"] == 1
-            assert [error["where"] for error in client.errors] == ["set.aus.12"]
-            with pytest.raises(ValueError, match="which are answered; got stop"):
-                await client.ask("stop")
+            for send in (client.control, client.ask):
+                with pytest.raises(ClientError, match=r"set\.aus\.12: "):
+                    await send("set", aus={"12": 7})
+                with pytest.raises(ClientError, match='got "stopp"'):
+                    await send("stopp")
+                with pytest.raises(ClientError, match=r"ping\.x"):
+                    await send("ping", x=1)
+                assert (await client.ask("ping", id=1))["id"] == 1
+            assert await client.ask("stop") == {}
+            both = await asyncio.gather(
+                client.control("stopp"), client.ask("ping", id=2), client.ask("state"), return_exceptions=True
+            )
+            assert [type(both[0]).__name__, both[1]["id"], both[2]["type"]] == ["ClientError", 2, "state"]
+            assert client.errors == []
 
     serving(test)
 

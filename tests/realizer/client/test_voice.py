@@ -223,7 +223,9 @@ def test_timed_takes_starts_with_or_without_ends() -> None:
         {"start": 0.0, "text": "a"},
         {"start": 0.5, "end": 1.0, "text": "b"},
     ]
-    for wrong in (["hello", 0.0, 1.0], "ab", (True, "a"), 3, ()):
+    fields = [{"start": 0.0, "text": "a"}, {"start": 0.5, "end": 1.0, "text": "b"}]
+    assert timed("words", fields) == fields
+    for wrong in (["hello", 0.0, 1.0], "ab", (True, "a"), 3, (), {"text": "a"}, {"start": 0, "word": "a"}):
         with pytest.raises(TypeError, match="words: wanted"):
             timed("words", [wrong])  # type: ignore[list-item]
     for start in (-0.1, np.inf, np.nan):
@@ -355,3 +357,47 @@ def test_voice_works_without_an_event_loop() -> None:
         assert await asyncio.to_thread(run) == ["DONE", "DONE"]
 
     serving(test)
+
+
+def test_say_and_voice_report_each_word_when_it_is_spoken() -> None:
+    words: list[Timed] = [{"start": 0.1, "text": "mama"}, {"start": 0.5, "end": 0.8, "text": "papa"}]
+    said: list[dict[str, Any]] = []
+
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.say(TONE, RATE, words=words, language="en", on_word=said.append)
+            assert end.warnings == ()
+            assert [(word["start"], word["text"]) for word in said] == [(0.1, "mama"), (0.5, "papa")]
+            assert said[1]["time"] - said[0]["time"] == pytest.approx(0.4, abs=1e-3)
+            async with client.voice(rate=RATE, language="en", on_word=said.append) as voice:
+                await voice.words(words)
+                for at in range(0, RATE, RATE // 5):
+                    await voice.write(TONE[at : at + RATE // 5])
+            await voice.ended()
+            assert [word["text"] for word in said[2:]] == ["mama", "papa"]
+
+    serving(test)
+
+
+def test_say_takes_words_in_milliseconds_with_a_warning() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.say(TONE, RATE, words=[(100, "mama"), (500, "papa")], language="en")
+            (warning,) = end.warnings
+            assert "taken as milliseconds" in warning.text
+
+    serving(test, limit=10)
+
+
+def test_play_and_say_tell_that_nothing_was_heard_or_moved(caplog: pytest.LogCaptureFixture) -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.play('<bml id="b"><head id="n" lexeme="NODD"/></bml>')
+            assert not end.shown
+            assert [warning.id for warning in end.warnings] == ["b:n"]
+            assert not (await client.say(np.zeros(RATE // 4, np.int16), RATE)).shown
+            assert (await client.play('<bml id="b"><head id="n" lexeme="NOD"/></bml>')).shown
+
+    serving(test)
+    lines = [r.getMessage() for r in caplog.records if "nothing of it was heard or moved" in r.getMessage()]
+    assert len(lines) == 2
