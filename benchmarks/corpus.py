@@ -29,7 +29,7 @@ from realizer_studio.corpus.find import agreement, find
 from realizer_studio.corpus.learn import learn, template_faps
 from realizer_studio.corpus.recording import Annotation, Recording
 from realizer_studio.tracking.markers.colours import named
-from realizer_studio.tracking.markers.film import Look, track_markers
+from realizer_studio.tracking.markers.film import MarkerSettings, track_markers
 from realizer_studio.tracking.pictures import read_pictures
 from tests.painted import hidden, truth, write_film
 
@@ -78,7 +78,9 @@ def film(face: str, seed: int, frames: int, folder: Path) -> Recording:
     if not path.is_file():
         write_film(path, face, acted.faps, gone)
     begin = time.process_time()
-    markers = track_markers(read_pictures(path)[1], Look((named("green"), named("blue"))), str(path))
+    markers = track_markers(
+        read_pictures(path)[1], MarkerSettings((named("green"), named("blue"))), str(path)
+    )
     spent = 1000 * (time.process_time() - begin) / frames
     off = np.linalg.norm(markers.pixels - true, axis=2)
     # A marker is in order if none of the others is nearer to it than its own.

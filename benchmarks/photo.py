@@ -122,7 +122,7 @@ def measure(name: str, turn: float, folder: Path, data: Path) -> None:
         side,
         made,
         data,
-        told={},
+        sliders={},
         progress=lambda step: print(f"  {step}", file=sys.stderr, flush=True),
     )
     wall, busy = time.perf_counter() - begin, time.process_time() - spent

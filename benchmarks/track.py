@@ -21,7 +21,7 @@ from realizer_studio.tracking.files import unit_columns
 from realizer_studio.tracking.follower import follow
 from realizer_studio.tracking.pictures import read_pictures
 from realizer_studio.tracking.recording import Recording, record
-from realizer_studio.tracking.regressor import SEEN_UNITS
+from realizer_studio.tracking.regressor import MEASURED_UNITS
 
 # Action units that are shown one after the other, and together as emotions do.
 SHOWN = (
@@ -86,7 +86,7 @@ def film(face: str, folder: Path, size: int) -> None:
 
 def units(recording: Recording, true: np.ndarray) -> None:
     """Print the correlation of each action unit."""
-    columns = [AU_NAMES().index(name) for name in SEEN_UNITS]
+    columns = [AU_NAMES().index(name) for name in MEASURED_UNITS]
     # The lids close in the same way in a blink.
     for side in "LR":
         shut, blink = (AU_NAMES().index(f"{number}{side}") for number in (43, 45))
@@ -94,7 +94,9 @@ def units(recording: Recording, true: np.ndarray) -> None:
     r = correlations(recording.units[: len(true)], true[:, columns].astype(np.float64), 0.005)
     means = {}
     for number in REPORTED:
-        sides = [value for name, value in zip(SEEN_UNITS, r, strict=True) if name.rstrip("LR") == str(number)]
+        sides = [
+            value for name, value in zip(MEASURED_UNITS, r, strict=True) if name.rstrip("LR") == str(number)
+        ]
         means[number] = float(np.nanmean(sides))
     print(f"  action units: mean r {np.nanmean(list(means.values())):.2f} over {len(means)} (0.75 asked)")
     print("  " + " ".join(f"AU{number}:{value:.2f}" for number, value in means.items()))
@@ -109,7 +111,9 @@ def photograph() -> None:
     _, pictures = read_pictures(Path(found.submodule_search_locations[0]) / "data" / "astronaut.png")
     times, people = follow(pictures)
     columns = unit_columns(record(people[0], times, 25.0))
-    ranked = sorted(((float(v[0]), name) for name, v in columns.items() if name in SEEN_UNITS), reverse=True)
+    ranked = sorted(
+        ((float(v[0]), name) for name, v in columns.items() if name in MEASURED_UNITS), reverse=True
+    )
     print(
         "astronaut (AU6 and AU12 strongest, AU4 and AU9 under 0.2 asked): "
         + " ".join(f"{n} {v:.2f}" for v, n in ranked[:12])

@@ -33,8 +33,8 @@ def vertices_of(name: str) -> tuple[int, ...]:
     marked = [(k, fp) for k, fp in enumerate(layout.feature_points) if fp]
     places = np.array([face.points[fp][:2] for _, fp in marked], np.float64)
     ones = np.ones((len(layout), 1))
-    shown = np.hstack([layout.places, ones])[[k for k, _ in marked]]
-    wanted = np.hstack([layout.places, ones]) @ np.linalg.lstsq(shown, places, rcond=None)[0]
+    shown = np.hstack([layout.positions, ones])[[k for k, _ in marked]]
+    wanted = np.hstack([layout.positions, ones]) @ np.linalg.lstsq(shown, places, rcond=None)[0]
     at = np.asarray(face.vertices, np.float64)
     found = []
     for k, place in enumerate(wanted):
@@ -140,4 +140,4 @@ def write_film(path: Path, name: str, faps: np.ndarray, gone: np.ndarray, fps: i
 
 def layout_in_pixels(name: str) -> Layout:
     """Return the layout where a face at rest has it, y up."""
-    return wojdel().at(truth(name, np.zeros((1, 68)))[0] * (1, -1))
+    return wojdel().with_positions(truth(name, np.zeros((1, 68)))[0] * (1, -1))

@@ -98,7 +98,7 @@ def found(names: list[str], data: Path, view: str) -> Iterator[tuple[np.ndarray,
     """Yield triangle and shares of all landmarks, for each picture."""
     for name in names:
         person = person_of(data, read_recipe(folder_of(name) / "recipe.toml", data).targets)
-        triangles = outer(person.ground.mesh)
+        triangles = outer(person.figure.mesh)
         for turn, light in zip(TURNS[view], LIGHTS * 2, strict=False):
             picture, camera = pictures(name, turn, light)
             regions = detect(picture)
@@ -106,7 +106,7 @@ def found(names: list[str], data: Path, view: str) -> Iterator[tuple[np.ndarray,
             if face is None or face.presence < 0.95:
                 print(f"{name} turned by {turn}: not found")
                 continue
-            yield seen_on(face.points[:, :2], person.ground.at, triangles, camera)
+            yield seen_on(face.points[:, :2], person.figure.at, triangles, camera)
             print(f"{name} turned by {turn}", flush=True)
 
 
@@ -134,8 +134,8 @@ def main() -> None:
     options = parser.parse_args()
     data = data_folder(options.data)
     names = [info.name for info in list_faces() if info.name not in options.without]
-    ground = person_of(data, read_recipe(folder_of(names[0]) / "recipe.toml", data).targets).ground
-    triangles, at = outer(ground.mesh), ground.at
+    figure = person_of(data, read_recipe(folder_of(names[0]) / "recipe.toml", data).targets).figure
+    triangles, at = outer(figure.mesh), figure.at
     lines = [NOTE + "view,landmark,a,b,c,share_b,share_c\n"]
     for view in TURNS:
         all_places = np.array(

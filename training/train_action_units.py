@@ -23,9 +23,9 @@ from realizer.animation.axis import AU_NAMES
 from realizer.face.load import list_faces
 from realizer_studio.tracking.landmarks import landmarks
 from realizer_studio.tracking.regressor import (
+    MEASURED_FAPS,
+    MEASURED_UNITS,
     PARTS,
-    SEEN_FAPS,
-    SEEN_UNITS,
     UP,
     WEIGHTS,
     Components,
@@ -189,8 +189,8 @@ def trained(data: Data, without: list[str], steps: int) -> dict[str, np.ndarray]
     chosen = ~np.isin(data["names"], without)
     arrays = bases(data, chosen)
     seen = seen_by(data, arrays)
-    columns = [AU_NAMES().index(name) for name in SEEN_UNITS]
-    moved = data["faps"][:, np.array(SEEN_FAPS) - 1]
+    columns = [AU_NAMES().index(name) for name in MEASURED_UNITS]
+    moved = data["faps"][:, np.array(MEASURED_FAPS) - 1]
     spread = np.maximum(moved[chosen].std(axis=0), 1.0)  # some never move
     turned = Rotation.from_matrix(np.einsum("nji,njk->nik", seen.rotations, data["rotations"])).as_rotvec()
     wanted = np.concatenate(
@@ -221,12 +221,12 @@ def trained(data: Data, without: list[str], steps: int) -> dict[str, np.ndarray]
 def report(name: str, result: np.ndarray, wanted: np.ndarray, neutral: np.ndarray) -> None:
     """Print how well faces are measured that were not learned from."""
     chosen, found = ~neutral, {}
-    for k, unit in enumerate(SEEN_UNITS):
+    for k, unit in enumerate(MEASURED_UNITS):
         if wanted[chosen, k].std() > 0.01:
             r = np.corrcoef(result[chosen, k], wanted[chosen, k])[0, 1]
             found.setdefault(unit.rstrip("LR"), []).append(r)
     means = {unit: float(np.mean(both)) for unit, both in found.items()}
-    first = len(SEEN_UNITS)
+    first = len(MEASURED_UNITS)
     faps = [
         np.corrcoef(result[chosen, k], wanted[chosen, k])[0, 1]
         for k in range(first, wanted.shape[1] - 3)

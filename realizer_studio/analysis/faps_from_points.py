@@ -1,4 +1,4 @@
-"""Tracked feature points: their files, and the FAPs and facial features that follow from them."""
+"""FAPs and facial features computed from tracked feature points, and a reader of their files."""
 
 from __future__ import annotations
 
@@ -78,36 +78,38 @@ def faps_from_points(points: Points, neutral: Points, fapu: Fapu) -> tuple[Float
         fapu: units of the same face.
 
     Returns:
-        (n, 68) FAP values, 0 if unobserved, and (68,) which of them were observed in all frames.
+        (n, 68) FAP values, 0 if unobserved, and (68,) whether each was observed in all frames.
 
     Raises:
         ValueError: no points, points without a neutral position, or arrays of different lengths.
     """
-    places, rest = _checked(points, neutral)
-    count = len(next(iter(places.values())))
-    values, seen = np.zeros((count, 68), np.float32), np.zeros(68, bool)
-    turns = _turns(places, rest)
-    if turns is not None:
-        rotation, moved = turns
+    positions, rest = _checked(points, neutral)
+    count = len(next(iter(positions.values())))
+    values, observed = np.zeros((count, 68), np.float32), np.zeros(68, bool)
+    pose = _skull_pose(positions, rest)
+    if pose is not None:
+        rotation, moved = pose
         values[:, HEAD] = head_angles(rotation) / ANGLE_UNIT
-        seen[HEAD] = True
-        # The rest is relative to the skull.
-        places = {name: np.einsum("nji,nj->ni", rotation, at - moved) for name, at in places.items()}
+        observed[HEAD] = True
+        # The other FAPs are relative to the skull.
+        positions = {
+            name: np.einsum("nji,nj->ni", rotation, position - moved) for name, position in positions.items()
+        }
     for row in tables.faps():
         if (
-            row.feature_point in places
+            row.feature_point in positions
             and row.direction in DIRECTIONS
             and row.unit not in ("none", "angle_unit")
         ):
             axis, sign = DIRECTIONS[row.direction]
-            distance = places[row.feature_point][:, axis] - rest[row.feature_point][axis]
+            distance = positions[row.feature_point][:, axis] - rest[row.feature_point][axis]
             values[:, row.fap - 1] = sign * distance / fapu.metres(row.unit)
-            seen[row.fap - 1] = True
-    if seen[DEPRESS_CHIN] and seen[OPEN_JAW]:
+            observed[row.fap - 1] = True
+    if observed[DEPRESS_CHIN] and observed[OPEN_JAW]:
         values[:, DEPRESS_CHIN] += values[:, OPEN_JAW]  # 2.10 moves with the jaw
     lost = np.isnan(values)
     values[lost] = 0
-    return values, seen & ~lost.any(axis=0)
+    return values, observed & ~lost.any(axis=0)
 
 
 def features_from_points(points: Points, neutral: Points, fapu: Fapu) -> Float64:
@@ -116,64 +118,66 @@ def features_from_points(points: Points, neutral: Points, fapu: Fapu) -> Float64
     Raises:
         ValueError: as for `faps_from_points`, or a missing point.
     """
-    places, rest = _checked(points, neutral)
-    wanted = {name for row in facial_features() for name in (row.first, row.second)}
-    if missing := sorted(wanted - set(places)):
+    positions, rest = _checked(points, neutral)
+    required = {name for row in facial_features() for name in (row.first, row.second)}
+    if missing := sorted(required - set(positions)):
         raise ValueError(f"points: wanted the 19 of the features, these are missing: {', '.join(missing)}")
     columns = []
     for row in facial_features():
-        now = np.linalg.norm(places[row.first] - places[row.second], axis=1)
+        now = np.linalg.norm(positions[row.first] - positions[row.second], axis=1)
         before = np.linalg.norm(rest[row.first] - rest[row.second])
         columns.append(row.growth * (now - before) / fapu.metres(row.unit))
     return np.stack(columns, axis=1)
 
 
 def faps_from_features(features: Any) -> tuple[Float32, Bool]:
-    """Return the FAPs (n, 68) that features (n, 15) determine, and (68,) which FAPs those are.
+    """Return the FAPs (n, 68) that features (n, 15) determine, and (68,) whether each is determined.
 
-    A feature that is the sum of several FAPs gives each an equal share (3.2). For brows, f1 and f2 have
+    A feature that is the sum of several FAPs is divided among them equally (3.2). For brows, f1 and f2 have
     priority over f15, which combines both.
     """
     values = np.asarray(features, np.float64)
     if values.ndim != 2 or values.shape[1] != 15:
         raise ValueError(f"features: wanted (n, 15), got {values.shape}")
-    frames, seen = np.zeros((len(values), 68), np.float32), np.zeros(68, bool)
+    frames, determined = np.zeros((len(values), 68), np.float32), np.zeros(68, bool)
     for row, column in zip(facial_features(), values.T, strict=True):
         part = column / len(row.signs)
         signs = dict(row.signs) | dict.fromkeys(row.also, 1)
         for fap, sign in signs.items():
-            if not seen[fap - 1]:
-                frames[:, fap - 1], seen[fap - 1] = sign * part, True
-    return frames, seen
+            if not determined[fap - 1]:
+                frames[:, fap - 1], determined[fap - 1] = sign * part, True
+    return frames, determined
 
 
 def _checked(points: Points, neutral: Points) -> tuple[dict[str, Float64], dict[str, Float64]]:
-    """Check and convert points to arrays (n, 3) and neutral positions to (3,)."""
+    """Check points, and convert them to arrays (n, 3) and neutral positions (3,)."""
     if not points:
         raise ValueError("points: wanted at least one feature point, got none")
-    if lost := sorted(set(points) - set(neutral)):
-        raise ValueError(f"points: wanted those with a neutral position, got {', '.join(lost)}")
-    places = {name: np.atleast_2d(np.asarray(at, np.float64)) for name, at in points.items()}
+    if unknown := sorted(set(points) - set(neutral)):
+        raise ValueError(f"points: wanted those with a neutral position, got {', '.join(unknown)}")
+    positions = {name: np.atleast_2d(np.asarray(position, np.float64)) for name, position in points.items()}
     rest = {name: np.asarray(neutral[name], np.float64) for name in points}
-    if bad := sorted({at.shape for at in rest.values()} - {(3,)}):
+    if bad := sorted({position.shape for position in rest.values()} - {(3,)}):
         raise ValueError(f"neutral: wanted (3,) each, got {bad[0]}")
-    shapes = sorted({at.shape for at in places.values()})
+    shapes = sorted({position.shape for position in positions.values()})
     if len(shapes) != 1 or shapes[0][1:] != (3,) or not shapes[0][0]:
         raise ValueError(f"points: wanted (n, 3) each, all of one n, got {', '.join(map(str, shapes))}")
-    if not all(np.isfinite(at).all() for at in rest.values()):
+    if not all(np.isfinite(position).all() for position in rest.values()):
         raise ValueError("neutral: wanted finite places, got NaN or infinity")
-    return places, rest
+    return positions, rest
 
 
-def _turns(places: Mapping[str, Float64], rest: Mapping[str, Float64]) -> tuple[Float64, Float64] | None:
+def _skull_pose(
+    positions: Mapping[str, Float64], rest: Mapping[str, Float64]
+) -> tuple[Float64, Float64] | None:
     """Return the rotation (n, 3, 3) and shift (n, 3) of the skull in each frame (Kabsch 1976), or None."""
-    steady = [name for name, at in places.items() if not np.isnan(at).any()]
+    steady = [name for name, position in positions.items() if not np.isnan(position).any()]
     groups = ([name for name in group if name in steady] for group in (SKULL, CORNERS))
     names = next((group for group in groups if len(group) >= 3), None)
     if names is None:
         return None
     before = np.stack([rest[name] for name in names])
-    after = np.stack([places[name] for name in names], axis=1)
+    after = np.stack([positions[name] for name in names], axis=1)
     middle, centre = before.mean(axis=0), after.mean(axis=1)
     covariance = np.einsum("ki,nkj->nij", before - middle, after - centre[:, None])
     u, _, vt = np.linalg.svd(covariance)
@@ -193,7 +197,7 @@ def head_angles(rotation: Float64) -> Float64:
 
 
 COLUMNS = ["frame", "point", "x", "y", "z"]
-MAX_FRAMES = 100_000  # an hour at 25 frames a second, and a little
+MAX_FRAMES = 100_000  # more than an hour at 25 frames a second
 
 
 def read_points(
@@ -206,7 +210,7 @@ def read_points(
 
     Args:
         where: name of the file in messages.
-        names: of possible points; None: all.
+        names: of allowed points; None for all.
 
     Raises:
         ValueError: invalid columns, cells or points; the text names the line.
@@ -218,37 +222,41 @@ def read_points(
         got = lines[0][1][:60] if lines else ""
         raise ValueError(f"{where}: wanted a first line {','.join(COLUMNS)}, got {got!r}")
     for number, line in lines[1:]:
-        place = f"{where}, line {number}"
+        location = f"{where}, line {number}"
         cells = next(csv.reader([line]))
         try:
             frame, name, (x, y, z) = int(cells[0]), cells[1].strip(), map(float, cells[2:])
         except (ValueError, IndexError):
-            raise ValueError(f"{place}: wanted {','.join(COLUMNS)}, got {line[:60]!r}") from None
+            raise ValueError(f"{location}: wanted {','.join(COLUMNS)}, got {line[:60]!r}") from None
         if not (0 <= frame < MAX_FRAMES and all(map(math.isfinite, (x, y, z)))):
             raise ValueError(
-                f"{place}: wanted a frame 0..{MAX_FRAMES - 1} and finite places, got {line[:60]!r}"
+                f"{location}: wanted a frame 0..{MAX_FRAMES - 1} and finite places, got {line[:60]!r}"
             )
         if names is not None and name not in names:
-            raise ValueError(f"{place}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")
+            raise ValueError(f"{location}: wanted a point of MPEG-4, 2.1 to 11.6, got {name[:20]!r}")
         if frame in found.setdefault(name, {}):
-            raise ValueError(f"{place}: point {name} is there twice in frame {frame}")
+            raise ValueError(f"{location}: point {name} is there twice in frame {frame}")
         found[name][frame] = x, y, z
         last = max(last, frame)
-    if restless := sorted(name for name, places in found.items() if 0 not in places):
-        raise ValueError(f"{where}: wanted every point at rest in frame 0, got none of {', '.join(restless)}")
+    if unanchored := sorted(name for name, samples in found.items() if 0 not in samples):
+        raise ValueError(
+            f"{where}: wanted every point at rest in frame 0, got none of {', '.join(unanchored)}"
+        )
     points = {}
-    for name, places in found.items():
-        way = np.full((last + 1, 3), np.nan)
-        way[list(places)] = list(places.values())
-        points[name] = way
-    return points, {name: way[0] for name, way in points.items()}
+    for name, samples in found.items():
+        trajectory = np.full((last + 1, 3), np.nan)
+        trajectory[list(samples)] = list(samples.values())
+        points[name] = trajectory
+    return points, {name: trajectory[0] for name, trajectory in points.items()}
 
 
 def bridge(points: Mapping[str, Float64]) -> dict[str, Float64]:
     """Return the trajectories (n, 3) without NaN: linear across gaps, constant after the last value."""
-    whole = {}
-    for name, way in points.items():
-        there = np.flatnonzero(~np.isnan(way).any(axis=1))
-        frames = np.arange(len(way))
-        whole[name] = np.stack([np.interp(frames, there, way[there, axis]) for axis in range(3)], axis=1)
-    return whole
+    bridged = {}
+    for name, trajectory in points.items():
+        known = np.flatnonzero(~np.isnan(trajectory).any(axis=1))
+        frames = np.arange(len(trajectory))
+        bridged[name] = np.stack(
+            [np.interp(frames, known, trajectory[known, axis]) for axis in range(3)], axis=1
+        )
+    return bridged

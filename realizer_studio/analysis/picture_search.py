@@ -23,8 +23,8 @@ FINE = 4  # pictures are drawn larger by this factor and reduced, to be smooth
 STEPS = (0.5, 1.0)  # compared intensities, as they move different places
 LIGHT = "portrait"  # the light of the reference pictures
 MIN_CORRELATION = 0.8  # of a front view with the neutral face
-# A picture is neutral if its difference to the neutral face is small (root mean square, of white; drawing at
-# another size makes 0.0065) and similar to no expression (cosine).
+# A picture is neutral if its difference from the neutral face is small (root mean square, of white; drawing
+# at another size makes 0.0065) and similar to no expression (cosine).
 MAX_NEUTRAL, MAX_COSINE = 0.009, 0.45
 
 
@@ -38,7 +38,7 @@ class Likeness:
 
     face: str
     light: str
-    # (expression, cosine between its and the picture's difference to the neutral face), best first.
+    # (expression, cosine between its and the picture's difference from the neutral face), best first.
     matches: Sequence[tuple[Expression, float]]
     neutral: bool  # whether the picture shows the neutral face
 
@@ -75,21 +75,21 @@ def by_picture(
     height, width = picture.shape[:2]
     size = max(round(width * HEIGHT / height), 1), HEIGHT
     if not HEIGHT // 4 <= size[0] <= 4 * HEIGHT:
-        raise UnknownPictureError(f"{_WANTED}, got one of {width}x{height} pixels")
+        raise UnknownPictureError(f"{_EXPECTED}, got one of {width}x{height} pixels")
     brightness = _brightness(_resized(picture, size))
     names = [info.name for info in list_faces()] if faces is None else faces
     # Faces differ more than lights and expressions, so the light is searched for one face only.
     name = max(names, key=lambda name: _correlation(brightness, *_neutral(name, LIGHT, size)))
     light = max(presets(), key=lambda light: _correlation(brightness, *_neutral(name, light, size)))
     if _correlation(brightness, *_neutral(name, light, size)) < MIN_CORRELATION:
-        raise UnknownPictureError(f"{_WANTED} ({', '.join(names)}), got one that is like none of them")
+        raise UnknownPictureError(f"{_EXPECTED} ({', '.join(names)}), got one that is like none of them")
     candidates = [(expression, step) for expression in expressions for step in STEPS]
     rows = [au_row({}), *(step * au_row(expression.aus) for expression, step in candidates)]
     (rest, face), *drawn = _draw(name, light, size, np.stack(rows))
     difference = (brightness - rest)[face]
     scores: dict[str, float] = {}
-    for (expression, _), (look, _) in zip(candidates, drawn, strict=True):
-        change = (look - rest)[face]
+    for (expression, _), (drawing, _) in zip(candidates, drawn, strict=True):
+        change = (drawing - rest)[face]
         norms = float(np.linalg.norm(change) * np.linalg.norm(difference))
         score = float(change @ difference) / norms if norms else 0.0
         scores[expression.name] = max(score, scores.get(expression.name, 0.0))
@@ -101,7 +101,7 @@ def by_picture(
     return Likeness(name, light, () if neutral else matches, neutral)
 
 
-_WANTED = "wanted a picture of one of our faces from the front, as `realizer realize --at` draws it"
+_EXPECTED = "wanted a picture of one of our faces from the front, as `realizer realize --at` draws it"
 
 
 @lru_cache(maxsize=32)

@@ -36,13 +36,17 @@ class Recogniser:
     The membership of a value is 1 / (1 + d^2), where d is its distance from the range of the FAP, relative to
     half of the range and the noise of landmarks (`tables/emotion_model.toml`; the shape of figure 6 is not in
     the text). FAPs that only other profiles move must be near 0. Dombi's t-norm of these memberships is
-    1 / (1 + sum d^2). The belief in a profile is its tolerant form with the mean instead of the sum, so that
-    a few FAPs out of their ranges are forgiven. The belief in an emotion is that of its best profile; below
-    a least belief, a frame is of no class. Of equal beliefs, the profile with more FAPs has priority.
+    1 / (1 + sum d^2). The belief in a profile uses the mean instead of the sum, which tolerates a few FAPs
+    outside their ranges. The belief in an emotion is that of its best profile; below a least belief, a frame
+    has no class. Of equal beliefs, the profile with more FAPs has priority.
     """
 
     def __init__(self, profiles: Iterable[Profile], strengths: Sequence[float] = (1.0,)) -> None:
-        """Take profiles, at least one; of the strengths, which are factors to try, the best one counts."""
+        """
+        Args:
+            profiles: at least one.
+            strengths: factors of the profiles; the best one of each profile counts.
+        """
         self.profiles = tuple(profiles)
         if not self.profiles:
             raise ValueError("profiles: wanted at least one, got none")
@@ -63,11 +67,11 @@ class Recogniser:
         self._noise = np.array([model.noise.get(row.unit, np.inf) for row in tables.faps()])
         self._emotions = [emotion_of(profile.name) for profile in self.profiles]
 
-    def beliefs(self, frames: Any, seen: Bool | None = None) -> Float64:
+    def beliefs(self, frames: Any, observed: Bool | None = None) -> Float64:
         """Return the beliefs (n, profiles) in FAP frames (n, 68).
 
         Args:
-            seen: (68,) which FAPs were observed; None: all.
+            observed: (68,) whether each FAP was observed; None for all.
 
         Raises:
             ValueError: frames of another shape, or values that are not finite.
@@ -77,7 +81,7 @@ class Recogniser:
             raise ValueError(f"frames: wanted (n, 68), got {values.shape}")
         if not np.isfinite(values).all():
             raise ValueError("frames: wanted finite values, got NaN or infinity")
-        judged = np.flatnonzero(self._judged if seen is None else self._judged & seen)
+        judged = np.flatnonzero(self._judged if observed is None else self._judged & observed)
         best: Float64 = np.zeros((len(values), len(self.profiles)))
         if not len(judged):
             return best
@@ -88,29 +92,31 @@ class Recogniser:
             np.maximum(best, 1 / (1 + np.minimum(squares, self._model.most_square).mean(axis=2)), out=best)
         return best
 
-    def names(self, frames: Any, seen: Bool | None = None) -> list[str | None]:
+    def names(self, frames: Any, observed: Bool | None = None) -> list[str | None]:
         """Return the emotion of each frame (eq. 11), or None."""
-        return [name for name, _ in self.certainties(frames, seen)]
+        return [name for name, _ in self.certainties(frames, observed)]
 
-    def certainties(self, frames: Any, seen: Bool | None = None) -> list[tuple[str | None, float]]:
+    def certainties(self, frames: Any, observed: Bool | None = None) -> list[tuple[str | None, float]]:
         """Return the emotion of each frame, or None, and the greatest belief."""
-        return [self._best(row) for row in self.beliefs(frames, seen)]
+        return [self._best(row) for row in self.beliefs(frames, observed)]
 
     def intervals(
-        self, frames: Any, fps: float, seen: Bool | None = None, there: Bool | None = None
+        self, frames: Any, fps: float, observed: Bool | None = None, visible: Bool | None = None
     ) -> list[Interval]:
-        """Return which emotions frames show, and when.
+        """Return the intervals of emotions in FAP frames (n, 68).
 
-        Frames are averaged over a short window before, and what is shorter than it belongs to the interval
-        before it, or else after it, so that noise does not split an expression. `there` (n,) says in which
-        frames the face was seen; others are in no interval.
+        Frames are first averaged over a short window. An interval shorter than the window is merged into the
+        one before it, or else after it, so that noise does not split an expression.
+
+        Args:
+            visible: (n,) whether the face was visible; other frames are in no interval.
         """
-        if there is not None:
+        if visible is not None:
             found, begin = [], 0
-            for shown, run in groupby(there.tolist()):
+            for is_visible, run in groupby(visible.tolist()):
                 end = begin + len(list(run))
-                if shown:
-                    parts = self.intervals(frames[begin:end], fps, seen)
+                if is_visible:
+                    parts = self.intervals(frames[begin:end], fps, observed)
                     found += [replace(p, start=p.start + begin / fps, end=p.end + begin / fps) for p in parts]
                 begin = end
             return found
@@ -120,7 +126,7 @@ class Recogniser:
         padded = np.pad(values, ((before, window - 1 - before), (0, 0)), mode="edge")
         smooth = np.lib.stride_tricks.sliding_window_view(padded, window, axis=0).mean(axis=-1)
         runs: list[tuple[str | None, list[float]]] = []
-        for name, run in groupby(self.certainties(smooth, seen), key=itemgetter(0)):
+        for name, run in groupby(self.certainties(smooth, observed), key=itemgetter(0)):
             beliefs = [belief for _, belief in run]
             if runs and (runs[-1][0] == name or len(beliefs) < window):
                 runs[-1][1].extend(beliefs)
@@ -145,13 +151,13 @@ class Recogniser:
 def recogniser(profiles: str = "own") -> Recogniser:
     """Return the recogniser of all profiles of a set, and of the neutral face.
 
-    Our own set has one profile per emotion, tried at several strengths, and includes smiles that show the
-    teeth and the advanced emotions of the wheel.
+    The set "own" has one profile per emotion, tried at several strengths, smiles that show the teeth, and the
+    advanced emotions of the wheel.
     """
     every = [profile for numbered in archetypes(profiles).values() for profile in numbered.values()]
     if profiles == "own":
-        blends = [place for place in ring("paul").values() if place.kind == "advanced"]
-        every += [replace(wheel(place.angle), name=place.name) for place in blends]
+        blends = [emotion for emotion in ring("paul").values() if emotion.kind == "advanced"]
+        every += [replace(wheel(emotion.angle), name=emotion.name) for emotion in blends]
         every += [_profile_of(f"joy {k}", units) for k, units in enumerate(emotion_model().smiles, 1)]
     strengths = emotion_model().strengths if profiles == "own" else (1.0,)
     return Recogniser([*every, Profile("neutral", profiles, {})], strengths)

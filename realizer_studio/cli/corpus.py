@@ -1,4 +1,4 @@
-"""`corpus`: recordings of people become labelled segments, statistics, rules and profiles."""
+"""`corpus`: makes labelled segments, statistics, rules and profiles from recordings of people."""
 
 import shutil
 from dataclasses import replace
@@ -13,7 +13,7 @@ from realizer.cli.progress import note
 from realizer.core.settings import Settings
 from realizer_studio.cli.edit_face import serve_tab
 from realizer_studio.cli.marker_options import follow as follow_markers
-from realizer_studio.cli.marker_options import look_of, marker_options
+from realizer_studio.cli.marker_options import marker_options, marker_settings
 from realizer_studio.cli.track import follow as follow_faces
 
 folder = click.argument("folder", metavar="DIR", type=options.FOLDER)
@@ -78,8 +78,8 @@ def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
     _check_corpus(folder)
     if Path(name).name != name or name.startswith("."):
         raise click.UsageError(f"wanted a name without / for the recording, got {name!r}")
-    there = (path / recordings.META).is_file()
-    found = recordings.read_recording(path) if there else recordings.Recording(name)
+    exists = (path / recordings.META).is_file()
+    found = recordings.read_recording(path) if exists else recordings.Recording(name)
     for file in files:
         if is_film(file):
             path.mkdir(exist_ok=True)
@@ -87,8 +87,8 @@ def add(folder: Path, name: str, files: tuple[Path, ...], **facts: Any) -> None:
                 shutil.copyfile(file, draft)
         else:
             found = merged(found, read_part(file))
-    known = {key: fact for key, fact in facts.items() if fact is not None}
-    found = replace(found, meta={**found.meta, **known})
+    given = {key: fact for key, fact in facts.items() if fact is not None}
+    found = replace(found, meta={**found.meta, **given})
     recordings.write_recording(path, found)
     note(f"{path}: {found.frames} frames, {len(found.labels)} labels, {len(found.words)} words")
 
@@ -117,23 +117,23 @@ def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, 
     failed = done = 0
     for film, target in found.items():
         try:
-            if (names and target.name not in names) or (known := films.to_track(target)) is None:
+            if (names and target.name not in names) or (recording_ := films.to_track(target)) is None:
                 continue
-            look = look_of(film, chosen, neutral)
-            if look is not None:
-                known = films.with_markers(known, follow_markers(film, look, None), face)
+            settings = marker_settings(film, chosen, neutral)
+            if settings is not None:
+                recording_ = films.with_markers(recording_, follow_markers(film, settings, None), face)
             else:
                 times, people = follow_faces(film, None)
-                known = films.with_face(known, people[0], times)
+                recording_ = films.with_face(recording_, people[0], times)
                 if len(people) > 1:
                     note(f"{film}: {len(people)} people; took the one who is seen most")
-            write_recording(target, known)
+            write_recording(target, recording_)
         except (TrackingError, CorpusError) as error:
             click.echo(f"realizer: {error}", err=True)
             failed += 1
             continue
         done += 1
-        note(f"{target}: {known.frames} frames")
+        note(f"{target}: {recording_.frames} frames")
     note(f"{folder}: {done} of {len(found)} films tracked, {failed} failed")
     return 1 if failed else 0
 
@@ -232,11 +232,15 @@ def find(folder: Path) -> None:
     learnt = load(folder)
     for one in (recording for recording in read_corpus(folder) if recording.has_frames):
         found = finding.find(one, learnt)
-        kept = replace(one, labels=tuple(label for label in one.labels if label.by != finding.FINDER))
-        labels = (*kept.labels, *(segment.annotation(one.fps) for segment in found))
+        others_labels = replace(
+            one, labels=tuple(label for label in one.labels if label.by != finding.FINDER)
+        )
+        labels = (*others_labels.labels, *(segment.annotation(one.fps) for segment in found))
         write_recording(folder / one.name, replace(one, labels=labels))
-        frames, met = finding.agreement(kept.segments(), found, one.frames)
-        agrees = f"; {frames:.1%} of frames and {met:.1%} of segments as labelled" if kept.labels else ""
+        frames, met = finding.agreement(others_labels.segments(), found, one.frames)
+        agrees = (
+            f"; {frames:.1%} of frames and {met:.1%} of segments as labelled" if others_labels.labels else ""
+        )
         click.echo(f"{one.name}: {len(found)} segments{agrees}")
 
 

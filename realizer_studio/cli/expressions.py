@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Least cosine of the best match; the motion of an idle head reaches 0.3.
 MIN_SIMILARITY = 0.4
-LEAST_SEEN = 0.15  # of a tracked action unit: one picture alone shows others by mistake
+LEAST_SEEN = 0.15  # intensity of a tracked action unit; in single pictures lower ones are noise
 
 sheet_output = option("-o --output SHEET.png", "Draw the expressions as well.", options.OUTPUT)
 
@@ -83,7 +83,7 @@ def list_(as_json: bool, output: Path | None, face: str, expressions: Path | Non
     "Face to draw; also the built-in face in the picture of --like.  [default: default; any with --like]",
 )
 @options.expressions
-def find(text: str | None, units: Any, like: Path | None, output: Path | None, **how: Any) -> int:
+def find(text: str | None, units: Any, like: Path | None, output: Path | None, **choices: Any) -> int:
     """Search expressions by the words of TEXT, by action units or by a picture, best match first.
 
     Exits with 1 if nothing matches.
@@ -99,8 +99,8 @@ def find(text: str | None, units: Any, like: Path | None, output: Path | None, *
     if sum(query is not None for query in (text, units, like)) != 1:
         raise click.UsageError("wanted one of TEXT, --au and --like")
     inputs.check_suffix(output, ".png")
-    library = list(library_of(inputs.settings(expressions=how["expressions"]).expressions).values())
-    face: str | None = how["face"]
+    library = list(library_of(inputs.settings(expressions=choices["expressions"]).expressions).values())
+    face: str | None = choices["face"]
     if text is not None:
         matches = by_meaning(text, library)
     elif units is not None:
@@ -108,9 +108,9 @@ def find(text: str | None, units: Any, like: Path | None, output: Path | None, *
     else:
         assert like is not None
         face, matches = _like(like, library, face)
-    matches = matches[: how["limit"]]
+    matches = matches[: choices["limit"]]
     matching, scores = [match[0] for match in matches], [f"{match[1]:.2f}" for match in matches]
-    _print_matches(matching, scores, how["as_json"])
+    _print_matches(matching, scores, choices["as_json"])
     if not matches:
         query_text = repr(text) if text is not None else "this query"
         click.echo(f"no expression matches {query_text}; see `realizer expressions list`", err=True)
@@ -122,7 +122,7 @@ def find(text: str | None, units: Any, like: Path | None, output: Path | None, *
 def _like(
     path: Path, library: Sequence[Expression], face: str | None
 ) -> tuple[str | None, list[tuple[Expression, float]]]:
-    """Return the face in a picture, None for one that is not ours, and the expressions, best match first."""
+    """Return the shipped face in a picture, or None, and the expressions, best match first."""
     from realizer_studio.analysis.picture_search import UnknownPictureError, by_picture, read_picture
 
     with inputs.reporting(UnknownPictureError):
@@ -144,19 +144,19 @@ def _tracked(path: Path, library: Sequence[Expression]) -> list[tuple[Expression
     from realizer_studio.analysis.expression_search import by_action_units
     from realizer_studio.tracking.network import TrackingError
     from realizer_studio.tracking.recording import record
-    from realizer_studio.tracking.regressor import SEEN_UNITS
+    from realizer_studio.tracking.regressor import MEASURED_UNITS
 
     with inputs.reporting(TrackingError):
         times, people = follow(path, None)
     values = record(people[0], times, 25.0).units[0]
-    shown = {
+    units = {
         unit: round(float(value), 2)
-        for unit, value in zip(SEEN_UNITS, values, strict=True)
+        for unit, value in zip(MEASURED_UNITS, values, strict=True)
         if value >= LEAST_SEEN
     }
-    seen = ", ".join(f"{unit}={value}" for unit, value in shown.items())
-    note(f"{path}: none of our faces; action units {seen or 'at rest'}")
-    return by_action_units(read_aus(shown, str(path)), library)
+    text = ", ".join(f"{unit}={value}" for unit, value in units.items())
+    note(f"{path}: none of our faces; action units {text or 'at rest'}")
+    return by_action_units(read_aus(units, str(path)), library)
 
 
 def _print_matches(expressions: Sequence[Expression], scores: Sequence[str], as_json: bool) -> None:

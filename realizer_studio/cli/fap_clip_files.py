@@ -95,7 +95,9 @@ def _from_csv(text: str) -> FAPClip:
     for fap, names in ((0, VISEME), (1, EXPRESSION)):
         mask[fap] = any(name in columns for name in names)
         compound.append(np.stack([columns.get(name, np.zeros(len(body))) for name in names], axis=1))
-    return FAPClip("", fps, _whole(values), mask, _whole(compound[0]), _whole(compound[1]), tuple(notes))
+    return FAPClip(
+        "", fps, _rounded(values), mask, _rounded(compound[0]), _rounded(compound[1]), tuple(notes)
+    )
 
 
 def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
@@ -109,9 +111,9 @@ def _rate(times: npt.NDArray[np.float64]) -> tuple[float, list[str]]:
     step = (times[-1] - times[0]) / (len(times) - 1)
     if not step > 0:
         raise RealizerError(f"time: wanted rising times, got {times[0]:g} to {times[-1]:g}")
-    away = np.abs(times - times[0] - step * np.arange(len(times)))
-    if away.max() > step / 2:
-        got = f"{times[away.argmax()]:g} in frame {away.argmax()}"
+    deviation = np.abs(times - times[0] - step * np.arange(len(times)))
+    if deviation.max() > step / 2:
+        got = f"{times[deviation.argmax()]:g} in frame {deviation.argmax()}"
         raise RealizerError(f"time: wanted frames {step:.4g} s apart, got {got}")
     return float(f"{1 / step:.6g}"), []
 
@@ -132,16 +134,16 @@ def _to_json(clip: FAPClip) -> str:
 
 def _from_json(text: str) -> FAPClip:
     try:
-        whole = json.loads(text)
+        content = json.loads(text)
     except ValueError as error:
         raise RealizerError(f"wanted JSON, got {error}") from None
-    fap = whole.get("fap")
+    fap = content.get("fap")
     if not isinstance(fap, dict) or "values" not in fap:
         raise RealizerError('wanted {"fps": ..., "fap": {"values": ...}}, got no values')
-    fps = _number(whole.get("fps", 25.0), "fps")
+    fps = _number(content.get("fps", 25.0), "fps")
     if not fps > 0:
         raise RealizerError(f"fps: wanted a number above 0, got {fps:g}")
-    values = _whole(np.stack(list(_rows(fap["values"], 68, "fap.values"))))
+    values = _rounded(np.stack(list(_rows(fap["values"], 68, "fap.values"))))
     count = len(values)
     mask = next(_rows([fap.get("mask", [1] * 68)], 68, "fap.mask")) != 0
     compound = []
@@ -150,9 +152,9 @@ def _from_json(text: str) -> FAPClip:
         rows = list(_rows(fap.get(name, [[0] * width] * count), width, f"fap.{name}"))
         if len(rows) != count:
             raise RealizerError(f"fap.{name}: wanted {count} frames, got {len(rows)}")
-        compound.append(_whole(np.stack(rows)))
+        compound.append(_rounded(np.stack(rows)))
     values[:, ~mask] = 0
-    return FAPClip(str(whole.get("name", "")), fps, values, mask, compound[0], compound[1])
+    return FAPClip(str(content.get("name", "")), fps, values, mask, compound[0], compound[1])
 
 
 def _rows(rows: Any, width: int, where: str) -> Iterator[npt.NDArray[np.float64]]:
@@ -176,7 +178,7 @@ def _number(cell: Any, where: str) -> float:
     return number
 
 
-def _whole(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
+def _rounded(values: npt.NDArray[np.float64]) -> npt.NDArray[np.int32]:
     return np.rint(values).astype(np.int32)
 
 

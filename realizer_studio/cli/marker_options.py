@@ -1,4 +1,4 @@
-"""Options of the commands that follow painted markers."""
+"""Options of the commands that track painted markers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from realizer.cli.options import option
 from realizer.cli.progress import bar
 
 if TYPE_CHECKING:
-    from realizer_studio.tracking.markers.film import Look, Markers
+    from realizer_studio.tracking.markers.film import Markers, MarkerSettings
 
 
 class Numbers(click.ParamType):  # type: ignore[type-arg]
@@ -60,14 +60,14 @@ marker_options = options.several(
 )
 
 
-def look_of(source: Path, chosen: dict[str, Any], neutral: int | None) -> Look | None:
-    """Return what the markers of a film look like by the values of `marker_options`, None without any.
+def marker_settings(source: Path, chosen: dict[str, Any], neutral: int | None) -> MarkerSettings | None:
+    """Return the settings for tracking markers from the values of `marker_options`, or None without markers.
 
     Raises:
-        TrackingError: values that cannot be used.
+        TrackingError: invalid values.
     """
     from realizer_studio.tracking.markers import colours
-    from realizer_studio.tracking.markers.film import Look
+    from realizer_studio.tracking.markers.film import MarkerSettings
     from realizer_studio.tracking.markers.layout import read_layout
     from realizer_studio.tracking.pictures import read_pictures
 
@@ -87,14 +87,14 @@ def look_of(source: Path, chosen: dict[str, Any], neutral: int | None) -> Look |
         if layout is not None or region is not None:
             raise click.UsageError("--layout and --region are for markers; see --markers")
         return None
-    return Look(found, read_layout(layout) if layout is not None else None, region, neutral)
+    return MarkerSettings(found, read_layout(layout) if layout is not None else None, region, neutral)
 
 
-def follow(source: Path, look: Look, fps: float | None) -> Markers:
-    """Return the markers of a film, with a bar that shows the progress."""
+def follow(source: Path, settings: MarkerSettings, fps: float | None) -> Markers:
+    """Return the markers of a film, with a progress bar."""
     from realizer_studio.tracking.markers.film import track_markers
     from realizer_studio.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
     with bar(pictures, count, "markers", least=2) as shown:
-        return track_markers(shown, look, str(source), fps)
+        return track_markers(shown, settings, str(source), fps)

@@ -35,7 +35,12 @@ from realizer.cli.progress import counting, note
 @options.opaque_background
 @option("--size", "Size of each picture.", default="220x280", callback=options.parse_size)
 def sheet(
-    name: str, output: Path, cameras: tuple[str, ...], size: tuple[int, int], mapping: Path | None, **how: Any
+    name: str,
+    output: Path,
+    cameras: tuple[str, ...],
+    size: tuple[int, int],
+    mapping: Path | None,
+    **choices: Any,
 ) -> None:
     """Draw what every FAP and action unit does to a face, to check the face by eye.
 
@@ -57,18 +62,18 @@ def sheet(
     cameras = cameras or ("front",)
     for camera in cameras:
         options.check_camera(name, camera)
-    usual = not (how["faps"] or how["aus"] or how["emotions"])
+    usual = not (choices["faps"] or choices["aus"] or choices["emotions"])
     face_mapping = mapping_of(name, inputs.settings(mapping=mapping).mapping)
     series = [sheet_poses.neutral()]
-    if how["faps"] or usual:
-        series += sheet_poses.of_faps(how["value"])
-    if how["aus"] or usual:
-        series += sheet_poses.of_aus(how["intensity"])
-    if how["emotions"]:
+    if choices["faps"] or usual:
+        series += sheet_poses.of_faps(choices["value"])
+    if choices["aus"] or usual:
+        series += sheet_poses.of_aus(choices["intensity"])
+    if choices["emotions"]:
         series += sheet_poses.of_emotions()
-    drawing = RenderSettings(size, light=how["light"], background=how["background"])
+    drawing = RenderSettings(size, light=choices["light"], background=choices["background"])
     count = sum(len(part.poses) for part in series)
-    face = name, how["deformer"], face_mapping
+    face = name, choices["deformer"], face_mapping
     with counting("drawing", count * len(cameras)) as step:
         groups = sheet_poses.draw(series, face, cameras, drawing, step)
     title = f"{name}: {', '.join(cameras)}. Left: as drawn; right: difference to the neutral face"

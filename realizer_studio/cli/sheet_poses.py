@@ -1,4 +1,4 @@
-"""The poses that a face sheet shows, and their pictures."""
+"""The poses of a face sheet, and their pictures."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ def frames(series: Sequence[Series]) -> AUFrames:
 
 
 def neutral() -> Series:
-    """Return the face at rest, with which all others are compared."""
+    """Return the face at rest, with which all poses are compared."""
     return Series("", [Pose(_faps({}), "neutral")])
 
 
@@ -67,13 +67,13 @@ def of_faps(value: float) -> list[Series]:
     return [
         Series(
             f"FAPs: {region.name}",
-            [pose for number in region.members for pose in _both_ways(rows[number], value)],
+            [pose for number in region.members for pose in _both_signs(rows[number], value)],
         )
         for region in regions("fap")
     ]
 
 
-def _both_ways(row: Fap, value: float) -> list[Pose]:
+def _both_signs(row: Fap, value: float) -> list[Pose]:
     size = value * TURN / HALF if row.unit == "angle_unit" else value
     found = []
     for sign in (1, -1):
@@ -162,10 +162,10 @@ def draw(
         behind = backdrop(drawing.size, preset(drawing.light), drawing.background)[..., :3]
     rows = poses_of(frames(series), input_names(name, deformer=deformer), mapping)
     pictures: list[list[Any]] = [[] for _ in rows]
-    look: dict[str, Any] = {"light": drawing.light, "background": "transparent", "deformer": deformer}
+    settings: dict[str, Any] = {"light": drawing.light, "background": "transparent", "deformer": deformer}
     for camera in cameras:
         neutral = below = None
-        with Renderer(name, drawing.size, camera, **look) as renderer:
+        with Renderer(name, drawing.size, camera, **settings) as renderer:
             for k, drawn in enumerate(renderer.frames(rows)):
                 picture = flatten(drawn, behind)
                 if neutral is None or below is None:

@@ -68,7 +68,7 @@ def _key(value: Path | None, answers: Sequence[Path]) -> Path:
 @option("--items", "Draw so many questions of each kind.  [default: all]", click.IntRange(1), name="most")
 @option("--seed", "Seed of all choices.  [default: a random one, told in the key]", click.IntRange(0))
 @option("--language", "First language of the page.", click.Choice(["en", "de", "pl"]), default="en")
-def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **what: Any) -> None:
+def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **choices: Any) -> None:
     """Write DIR, which opens in any browser, and its right answers to DIR.key.json beside it.
 
     Hand out the folder, with a number to each judge, and keep the key. Answers come back as CSV.
@@ -79,8 +79,8 @@ def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **
 
     with inputs.reporting(ValueError):
         check_folder(folder)
-    variants = _variants(what.pop("faces"), what.pop("deformers"), what.pop("mappings"))
-    plan = Plan(kinds, variants, seed=secrets.randbelow(2**32) if seed is None else seed, **what)
+    variants = _variants(choices.pop("faces"), choices.pop("deformers"), choices.pop("mappings"))
+    plan = Plan(kinds, variants, seed=secrets.randbelow(2**32) if seed is None else seed, **choices)
     with inputs.reporting(TrackingError), counting("drawing", plan.drawn) as step:
         items = plan.items(step)
     about = {"judges": judges, "language": plan.language, "seed": plan.seed}
@@ -134,9 +134,9 @@ def analyse(
     answers = read_answers(files, truths)
     failed = inattentive(answers)
     if failed:
-        named = ", ".join(f"{judge} ({who})" for who, judge in failed)
+        named = ", ".join(f"{judge} ({group})" for group, judge in failed)
         click.echo(f"failed attention items, {'kept' if keep else 'left out'}: {named}", err=True)
-    if not keep and len(failed) == len({(one.who, one.judge) for one in answers}):
+    if not keep and len(failed) == len({(one.group, one.judge) for one in answers}):
         raise click.ClickException("wanted answers of a judge who passed the attention items; see --keep")
     with inputs.opening(output):
         names = write_report(output, truths, answers, pictures or key.parent / truths["folder"], keep)

@@ -12,15 +12,15 @@ from realizer.cli.options import option
 from realizer.cli.progress import bar, note
 from realizer.core.errors import FaceError
 from realizer_studio.cli.marker_options import follow as follow_markers
-from realizer_studio.cli.marker_options import look_of, marker_options
+from realizer_studio.cli.marker_options import marker_options, marker_settings
 
 if TYPE_CHECKING:
     from realizer.core.array_types import Float64
     from realizer.face.model import Fapu
-    from realizer_studio.tracking.follower import Person, Unfinished
-    from realizer_studio.tracking.markers.film import Look
+    from realizer_studio.tracking.follower import LandmarkCache, Person
+    from realizer_studio.tracking.markers.film import MarkerSettings
 
-# The text of OUT, its rate, its FAPs, which of them were seen, and in which frames (None: in all).
+# The text of OUT, its rate, its FAPs, a mask of measured FAPs, and of frames with the face (None for all).
 Tracked: TypeAlias = "tuple[str, float, Any, Any, Any]"
 POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of standard input
 
@@ -43,7 +43,7 @@ POINTS = (".csv", ".txt", "")  # suffixes of tables of points; the last is of st
 @option("--neutral N|PICTURE", "The face at rest: a picture, or picture N (from 0) of IN.")
 @option("--person", "Which of several people; 1 is seen most.", click.IntRange(1), default=1)
 @marker_options
-def track(source: str, output: Path, fps: float | None, profiles: str | None, **how: Any) -> None:
+def track(source: str, output: Path, fps: float | None, profiles: str | None, **choices: Any) -> None:
     """Convert a film, a picture, a folder of pictures, or tracked feature points to movements of a face.
 
     OUT is a FAP file, which any face can play, a table of action units from 0 to 1, both in JSON, or a BML
@@ -68,7 +68,7 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
     if source == "-" or (Path(source).suffix.lower() in POINTS and Path(source).is_file()):
         text, rate, values, seen, there = _from_points(source, output, fps or 25.0)
     else:
-        text, rate, values, seen, there = _from_pictures(Path(source), output, fps, **how)
+        text, rate, values, seen, there = _from_pictures(Path(source), output, fps, **choices)
     with inputs.opening(output):
         write_bytes(output, text.encode())
     if profiles is not None:
@@ -100,17 +100,19 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
     return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen, None
 
 
-def _from_markers(source: Path, output: Path, fps: float | None, look: Look, face: str) -> Tracked:
+def _from_markers(
+    source: Path, output: Path, fps: float | None, settings: MarkerSettings, face: str
+) -> Tracked:
     from realizer_studio.tracking.markers.film import FORMATS, faps_of
     from realizer_studio.tracking.network import TrackingError
 
     inputs.check_suffix(output, *FORMATS)
     with inputs.reporting(TrackingError):
-        markers = follow_markers(source, look, fps)
+        markers = follow_markers(source, settings, fps)
         text = FORMATS[output.suffix.lower()](markers, face, output.stem)
         known = len([name for name in markers.layout.feature_points if name]) > 1
         faps, seen = faps_of(markers, face) if known else (None, None)
-    found = f"{len(markers.layout)} markers, {markers.seen.mean():.1%} of them seen"
+    found = f"{len(markers.layout)} markers, {markers.visible.mean():.1%} of them seen"
     note(f"{output}: {len(markers.points)} frames, {found}")
     return text, markers.fps, faps, seen, None
 
@@ -127,19 +129,19 @@ def _from_pictures(
 ) -> Tracked:
     """Return what the face in pictures does, or what painted markers on it do."""
     from realizer_studio.tracking.files import FORMATS, by_mapping, mask
-    from realizer_studio.tracking.follower import Unfinished
+    from realizer_studio.tracking.follower import LandmarkCache
     from realizer_studio.tracking.network import TrackingError
     from realizer_studio.tracking.recording import rate_of, record
 
     with inputs.reporting(TrackingError):
         number = int(neutral) if neutral is not None and neutral.isdecimal() else None
-        look = look_of(source, chosen, number)
-    if look is not None:
-        return _from_markers(source, output, fps, look, face or "default")
+        settings = marker_settings(source, chosen, number)
+    if settings is not None:
+        return _from_markers(source, output, fps, settings, face or "default")
     inputs.check_suffix(output, *FORMATS)
     with inputs.reporting(TrackingError):
-        kept = Unfinished(output.with_name(f"{output.name}.part"), source) if source.is_file() else None
-        times, people = follow(source, fps, kept)
+        cache = LandmarkCache(output.with_name(f"{output.name}.part"), source) if source.is_file() else None
+        times, people = follow(source, fps, cache)
         if person > len(people):
             raise click.BadParameter(f"there are {len(people)} people in {source}", param_hint="--person")
         subject = people[person - 1]
@@ -148,24 +150,24 @@ def _from_pictures(
     if face is not None:
         recording = by_mapping(recording, face)
     others = f"; {len(people)} people, this is --person {person}" if len(people) > 1 else ""
-    note(f"{output}: {len(recording.times)} frames, the face is in {recording.seen.mean():.0%}{others}")
+    note(f"{output}: {len(recording.times)} frames, the face is in {recording.visible.mean():.0%}{others}")
     text = FORMATS[output.suffix.lower()](recording, output.stem)
-    if kept is not None:
-        kept.remove()
-    return text, recording.fps, recording.faps, mask(), recording.seen
+    if cache is not None:
+        cache.remove()
+    return text, recording.fps, recording.faps, mask(), recording.visible
 
 
 def follow(
-    source: Path, fps: float | None, kept: Unfinished | None = None
+    source: Path, fps: float | None, cache: LandmarkCache | None = None
 ) -> tuple[list[float], list[Person]]:
-    """Return the times of all pictures, and the people in them; what is kept is not looked at again."""
+    """Return the times of all pictures, and the people in them; cached pictures are skipped."""
     from realizer_studio.tracking.follower import follow
     from realizer_studio.tracking.network import TrackingError
     from realizer_studio.tracking.pictures import read_pictures
 
     count, pictures = read_pictures(source, fps or 25.0)
     with bar(pictures, count, "tracking", least=2) as shown:
-        times, people = follow(shown, kept)
+        times, people = follow(shown, cache)
     if not people:
         raise TrackingError(
             f"{source}: wanted a face, found none in {len(times)} picture{'s' * (len(times) != 1)}; it must "
@@ -175,7 +177,7 @@ def follow(
 
 
 def _neutral(neutral: str, person: Person) -> Person:
-    """Return the person at rest: a picture of a film by its number, or a file."""
+    """Return the person at rest, from a picture of the film by its number, or from a file."""
     from realizer_studio.tracking.follower import Person
 
     if neutral.isdecimal():
@@ -196,7 +198,7 @@ def _fapu(rest: dict[str, Float64], where: str) -> Fapu:
 
     try:
         with inputs.reporting(FaceError):
-            return fapu_of({name: place.astype(np.float32) for name, place in rest.items()}, where)
+            return fapu_of({name: position.astype(np.float32) for name, position in rest.items()}, where)
     except KeyError as missing:
         raise click.UsageError(
             f"{where}: wanted point {missing.args[0]} in frame 0, to measure the face's proportions"

@@ -22,23 +22,26 @@ from realizer_studio.corpus.recording import Recording, Segment
 from realizer_studio.corpus.statistics import FEWEST, Study
 
 FOLDER = "expressions"
-SEEN = range(1, 51)  # action units of the face; the others turn head and eyes
-MOST, WORTH = 6, 0.04  # units of an expression, and the least share of its squared movement that one explains
+FACE_UNITS = range(1, 51)  # action units of the face; the others move head and eyes
+MOST, LEAST_GAIN = (
+    6,
+    0.04,
+)  # units of an expression at most; least share of its squared displacement that a unit explains
 LEAST = 0.1  # intensity of a unit
-RISING = 0.1, 0.9  # of the strength of a segment, between which it rises and falls
-AROUND = 1.0  # s before and after a segment in which it does
-PROBABLE = 25, 75  # per cent of the segments are shorter than the ends of the probable range
+RISING = 0.1, 0.9  # of a segment's strength; onset and offset are measured between these
+AROUND = 1.0  # s before and after a segment that are searched for onset and offset
+PROBABLE = 25, 75  # percentiles of the lengths of segments, the ends of the probable range
 
 
 @dataclass(frozen=True)
 class Found:
-    """An expression that a corpus shows.
+    """An expression of a corpus.
 
     Attributes:
         aus: unit such as "12" or "12L" -> intensity 0..1.
         gaps: seconds of onset, apex and offset.
-        possible, probable: ranges of seconds for which it is visible; None: too few segments.
-        source: where it was seen.
+        possible, probable: ranges of its duration in seconds; None for too few segments.
+        source: a sentence about its origin.
     """
 
     name: str
@@ -52,33 +55,42 @@ class Found:
 def found_expressions(study: Study) -> list[Found]:
     """Return the expressions of recordings with FAPs, most frequent first.
 
-    The median face of all segments is explained by a few action units (matching pursuit, their intensities by
-    non-negative least squares). Onset and offset are the medians of the times from 10 to 90 % of a segment's
-    strength and back.
+    The median face of all segments is approximated by a few action units (matching pursuit, with
+    intensities by non-negative least squares). Onset and offset are the median times from 10 to 90 % of a
+    segment's strength and back.
     """
-    whole = {id(one): features(one) for one in study.recordings if one.faps is not None}
+    face_frames = {id(one): features(one) for one in study.recordings if one.faps is not None}
     found = []
     for name in study.totals:
-        seen = [
+        occurrences = [
             (recording, one)
             for recording, segments in study.parts
             for one in segments
-            if one.text == name and id(recording) in whole and one.first < len(whole[id(recording)])
+            if one.text == name
+            and id(recording) in face_frames
+            and one.first < len(face_frames[id(recording)])
         ]
-        if not seen:
+        if not occurrences:
             continue
-        faces = [np.median(whole[id(r)][one.first : one.last + 1], axis=0) for r, one in seen]
+        faces = [np.median(face_frames[id(r)][one.first : one.last + 1], axis=0) for r, one in occurrences]
         face = np.median(faces, axis=0)
         if aus := units_of(face):
-            ramps = [_ramps(whole[id(r)] @ face / max(float(face @ face), 1e-12), one, r) for r, one in seen]
-            found.append(_found(name, aus, np.median(ramps, axis=0), [len(one) / r.fps for r, one in seen]))
+            ramps = [
+                _ramps(face_frames[id(r)] @ face / max(float(face @ face), 1e-12), one, r)
+                for r, one in occurrences
+            ]
+            found.append(
+                _expression_of(
+                    name, aus, np.median(ramps, axis=0), [len(one) / r.fps for r, one in occurrences]
+                )
+            )
     return found
 
 
 def units_of(face: Float64) -> dict[str, float]:
-    """Return the action units that explain a face (68,) in millimetres, as `learn.features` gives it."""
-    names, shown = _units()
-    chosen, weights = explain(face[None], shown, MOST, WORTH)
+    """Return the action units that explain a face (68,) in millimetres, as `learn.features` returns it."""
+    names, unit_faces = _units()
+    chosen, weights = explain(face[None], unit_faces, MOST, LEAST_GAIN)
     pairs = sorted(zip(chosen, weights[0].tolist(), strict=True))
     return {names[k]: round(min(weight, 1.0), 2) for k, weight in pairs if weight >= LEAST}
 
@@ -96,20 +108,20 @@ def write_expressions(folder: Path, study: Study) -> list[str]:
 
 @cache
 def _units() -> tuple[tuple[str, ...], Float64]:
-    """Return names and millimetres (n, 68) of the action units that move FAPs, of both sides and of each."""
-    moving = {row.au for row in au_to_fap()} & {*SEEN}
+    """Return names and FAP displacements (n, 68), mm, of action units of both sides and of each side."""
+    moving = {row.au for row in au_to_fap()} & {*FACE_UNITS}
     keys = [
         (row.au, side)
         for row in action_units()
         if row.au in moving
         for side in (SIDES if row.sides else ("",))
     ]
-    shown = faps_of(np.stack([au_row({(number, SIDES[side]): 1.0}) for number, side in keys]))
-    return tuple(f"{number}{side}" for number, side in keys), features(Recording("", faps=shown))
+    unit_faps = faps_of(np.stack([au_row({(number, SIDES[side]): 1.0}) for number, side in keys]))
+    return tuple(f"{number}{side}" for number, side in keys), features(Recording("", faps=unit_faps))
 
 
 def _ramps(strength: Float64, one: Segment, recording: Recording) -> tuple[float, float]:
-    """Return the seconds in which a segment rises and falls."""
+    """Return the seconds of a segment's onset and offset."""
     top = float(np.quantile(strength[one.first : one.last + 1], 0.9))
     around = round(AROUND * recording.fps)
     before = strength[max(one.first - around, 0) : one.last + 1]
@@ -122,16 +134,16 @@ def _ramps(strength: Float64, one: Segment, recording: Recording) -> tuple[float
     return frames[0] / recording.fps, frames[1] / recording.fps
 
 
-def _found(name: str, aus: Mapping[str, float], ramps: Float64, lengths: list[float]) -> Found:
-    """Return an expression whose apex leaves it visible for the median length, half of its ramps included."""
+def _expression_of(name: str, aus: Mapping[str, float], ramps: Float64, lengths: list[float]) -> Found:
+    """Return an expression that is visible for the median length, including half of its onset and offset."""
     least = [gap.least for gap in gaps("face").gaps]
     onset, offset = max(float(ramps[0]), least[0]), max(float(ramps[1]), least[2])
     visible = float(np.median(lengths))
     apex = max(visible - onset / 2 - offset / 2, least[1])
-    shown = apex + onset / 2 + offset / 2
+    visible_part = apex + onset / 2 + offset / 2
     possible = probable = None
     if len(lengths) >= FEWEST:
-        possible = min(*lengths, shown), max(*lengths, shown)
+        possible = min(*lengths, visible_part), max(*lengths, visible_part)
         low, high = np.percentile(lengths, PROBABLE).tolist()
         probable = (low, high) if low < high else None
     source = f"median of {len(lengths)} segments of a corpus, by `realizer corpus describe`"
@@ -139,7 +151,7 @@ def _found(name: str, aus: Mapping[str, float], ramps: Float64, lengths: list[fl
 
 
 def _toml(one: Found) -> str:
-    """Return the file of an expression; it has the name that `enrich` shows it by."""
+    """Return the file of an expression, which has the name that `enrich` uses."""
     units = ", ".join(f"{unit} = {value:g}" for unit, value in one.aus.items())
     rows = {"name": json.dumps(PREFIX + one.name, ensure_ascii=False), "aus": f"{{ {units} }}"}
     rows["means"] = json.dumps([one.name], ensure_ascii=False)
@@ -148,7 +160,7 @@ def _toml(one: Found) -> str:
     }
     for key, ends in (("possible", one.possible), ("probable", one.probable)):
         if ends is not None:
-            # Rounded outwards and inwards, so that one stays within the other.
+            # Four digits, so that the probable range stays within the possible one.
             rows[key] = f"[{ends[0]:.4f}, {ends[1]:.4f}]"
     rows["source"] = json.dumps(one.source)
     return "".join(f"{key} = {value}\n" for key, value in rows.items())

@@ -1,4 +1,4 @@
-"""Films of a corpus: which of them are still to be tracked, and what tracking adds to a recording."""
+"""Films of a corpus: finding those that are not tracked yet, and adding tracked data to recordings."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -21,10 +21,12 @@ def is_film(path: Path) -> bool:
 
 
 def films(folder: Path) -> dict[Path, Path]:
-    """Return film -> folder of its recording: films in folders of recordings, and films beside them.
+    """Return film -> folder of its recording, for films in folders of recordings and beside them.
 
-    A film beside the folders belongs to the recording of its name, which may not exist yet. Raises
-    CorpusError if two films have one recording.
+    A film beside the folders belongs to the recording with its name, which may not exist yet.
+
+    Raises:
+        CorpusError: two films belong to one recording.
     """
     found: dict[Path, Path] = {}
     for path in sorted(folder.iterdir()):
@@ -41,16 +43,16 @@ def films(folder: Path) -> dict[Path, Path]:
 
 
 def to_track(target: Path) -> Recording | None:
-    """Return the recording of a film as far as it is known, None if it has points or FAPs.
+    """Return the recording of an untracked film, or None if it has points or FAPs.
 
-    What is half written (it has no facts yet) keeps its labels and words, and is tracked again.
+    An incomplete recording, without meta.toml, keeps its labels and words, and is tracked again.
     """
     if not (target / META).is_file():
         return (
             replace(read_parts(target), faps=None, points=None) if target.is_dir() else Recording(target.name)
         )
-    known = read_recording(target)
-    return None if known.has_frames else known
+    stored = read_recording(target)
+    return None if stored.has_frames else stored
 
 
 def with_face(recording: Recording, person: Person, times: Sequence[float]) -> Recording:
@@ -62,8 +64,8 @@ def with_face(recording: Recording, person: Person, times: Sequence[float]) -> R
 def with_markers(recording: Recording, markers: Markers, face: str) -> Recording:
     """Return a recording with tracked markers, and their FAPs if they are feature points."""
     points = np.concatenate([markers.points, np.zeros((*markers.points.shape[:2], 1))], axis=2)
-    shown: Float64 | None = None
+    fap_values: Float64 | None = None
     if sum(map(bool, markers.layout.feature_points)) > 1:
-        shown = faps_of(markers, face)[0]
+        fap_values = faps_of(markers, face)[0]
     meta = {**recording.meta, "fps": markers.fps}
-    return replace(recording, meta=meta, faps=shown, points=(markers.layout.names, points))
+    return replace(recording, meta=meta, faps=fap_values, points=(markers.layout.names, points))

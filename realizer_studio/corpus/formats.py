@@ -1,4 +1,4 @@
-"""Files of other programs that belong to a recording: read by suffix and content, written by suffix."""
+"""Readers and writers of other programs' files that belong to a recording."""
 
 import json
 import re
@@ -49,7 +49,7 @@ EAF = """\
 <LINGUISTIC_TYPE LINGUISTIC_TYPE_ID="default" TIME_ALIGNABLE="true"/>
 </ANNOTATION_DOCUMENT>
 """
-# Errors of readers of a damaged file; that of XML is a SyntaxError.
+# Errors of readers of damaged files; that of XML is a SyntaxError.
 DAMAGE = (
     OSError,
     ValueError,
@@ -64,10 +64,10 @@ Spans = Iterable[tuple[float, float, str]]
 
 
 def read_part(path: Path) -> Recording:
-    """Return what a file has of a recording: FAPs, points, labels or words.
+    """Return the part of a recording in a file: FAPs, points, labels or words.
 
-    - .csv: our labels, words, FAPs or action units (as `realizer realize` and `track` write them) or tracked
-      points, OpenFace's features, or Live Link's blend shapes;
+    - .csv: labels, words, FAPs or action units as this project writes them, tracked points, OpenFace's
+      features, or Live Link's blend shapes;
     - .fap: FAPs;
     - .eaf (ELAN) and .TextGrid (Praat): tiers of intervals; a tier `words` or `words SPEAKER` has words, any
       other labels by the annotator of its name;
@@ -96,7 +96,7 @@ def write_annotations(path: Path, recording: Recording) -> None:
     named = [(one.by or "labels", one) for one in recording.labels]
     named += [(f"words {one.by}".strip(), one) for one in recording.words]
     for name, one in sorted(named, key=lambda pair: (pair[1].start, pair[1].end)):
-        number, tier = 1, name  # what overlaps in a tier goes to another one with a number
+        number, tier = 1, name  # overlapping annotations go to another tier with a number
         while tier in tiers and tiers[tier][-1].end > one.start + 1e-6:
             number += 1
             tier = f"{name} ({number})"
@@ -111,7 +111,7 @@ def write_annotations(path: Path, recording: Recording) -> None:
 
 
 def merged(recording: Recording, part: Recording) -> Recording:
-    """Return a recording with what another one has; its labels and words are added."""
+    """Return a recording with the data of another one, whose labels and words are added."""
     return replace(
         recording,
         meta={**recording.meta, **part.meta},
@@ -134,7 +134,7 @@ def _csv(text: str) -> Recording:
             raise ValueError("points without a row")
         tracked = tuple(moving), np.stack(list(moving.values()), axis=1)
         try:
-            fapu = fapu_of({name: place.astype(np.float32) for name, place in rest.items()})
+            fapu = fapu_of({name: position.astype(np.float32) for name, position in rest.items()})
         except (KeyError, FaceError):  # too few points for FAPs
             return Recording("", points=tracked)
         return Recording(
@@ -146,8 +146,8 @@ def _csv(text: str) -> Recording:
             (int(name[2:4]), "BOTH"): columns[name] / 5 for name in head if re.fullmatch(r"AU\d\d_r", name)
         }
         marks = tuple(name[2:] for name in head if re.fullmatch(r"X_\d+", name))
-        places = np.array([[columns[f"{side}_{mark}"] for mark in marks] for side in "XYZ"])
-        points = (marks, places.transpose(2, 1, 0) * [1.0, -1.0, -1.0]) if marks else None
+        coordinates = np.array([[columns[f"{side}_{mark}"] for mark in marks] for side in "XYZ"])
+        points = (marks, coordinates.transpose(2, 1, 0) * [1.0, -1.0, -1.0]) if marks else None
         return Recording("", {"fps": rate_of(columns["timestamp"])}, faps=_faps_of(units), points=points)
     if "blendshapecount" in map(str.lower, head):  # Live Link: names with a capital, 60 frames a second
         weights = {name[:1].lower() + name[1:]: cells for name, cells in columns.items()}
@@ -171,16 +171,16 @@ def _json(text: str) -> Recording:
     if isinstance(data, dict):
         words = [Annotation(float(w["start"]), float(w["end"]), str(w["text"])) for w in data["words"]]
         return Recording("", words=tuple(words))
-    places, weights = [], []  # of MediaPipe: a list of frames, of which the first face counts
+    rows, weights = [], []  # MediaPipe: a list of frames; the first face of each is read
     for frame in data:
-        marks, shown = (
+        marks, blendshapes = (
             frame.get("faceLandmarks") or [[]],
             frame.get("faceBlendshapes") or [{"categories": []}],
         )
-        places.append([[mark["x"], -mark["y"], -mark.get("z", 0.0)] for mark in marks[0]])
-        weights.append({one["categoryName"]: one["score"] for one in shown[0]["categories"]})
-    count = max(map(len, places))
-    points = np.array([row if len(row) == count else [[np.nan] * 3] * count for row in places], np.float64)
+        rows.append([[mark["x"], -mark["y"], -mark.get("z", 0.0)] for mark in marks[0]])
+        weights.append({one["categoryName"]: one["score"] for one in blendshapes[0]["categories"]})
+    count = max(map(len, rows))
+    points = np.array([row if len(row) == count else [[np.nan] * 3] * count for row in rows], np.float64)
     times = np.array([float(frame.get("timestamp", 40 * k)) / 1000 for k, frame in enumerate(data)])
     columns = {name: np.array([row.get(name, 0.0) for row in weights]) for name in set().union(*weights)}
     return Recording(
@@ -225,7 +225,7 @@ def _textgrid(text: str) -> Recording:
     pieces = [piece.replace('""', "\0") for piece in TIER.split(re.sub(r" *= *", " = ", text))[1:]]
     tiers = {
         name.replace("\0", '"'): [
-            (float(a), float(b), said.replace("\0", '"')) for a, b, said in INTERVAL.findall(rest)
+            (float(a), float(b), label.replace("\0", '"')) for a, b, label in INTERVAL.findall(rest)
         ]
         for name, rest in zip(pieces[::2], pieces[1::2], strict=True)
     }

@@ -20,15 +20,15 @@ from realizer.tables.templates import templates
 from realizer_studio.corpus.recording import CorpusError, Recording
 
 VARIANCE = 0.9  # of the data that the components keep
-FAR = 0.3  # of the frames, those farthest from the mean, train the map; hers show expressions in 28 %
+FAR = 0.3  # of the frames, those farthest from the mean, train the map; Wojdel's show expressions in 28 %
 SIDE = 10  # neurons of a side of the map
 ROUNDS = 60  # of its training
-WIDEST, NARROWEST = SIDE / 3, 0.6  # radius of a neuron's neighbourhood at the first and last round
+WIDEST, NARROWEST = SIDE / 3, 0.6  # radius of a neuron's neighbourhood in the first and last round
 LIKE = 0.6  # least cosine of a neuron and the template that names it
-MAJORITY = 0.5  # of the accepted frames that show what a neuron shows
-RECENT = 25  # frames over which the majority is counted
-USUAL = 0.9  # of a neuron's own frames are accepted if nobody has labelled frames,
-NEARER = 0.5  # but only those nearer to it than this part of its distance from the mean frame
+MAJORITY = 0.5  # least share of a neuron's expression among its accepted frames
+RECENT = 25  # frames over which this share is counted
+USUAL = 0.9  # share of a neuron's frames that are accepted if no frames are labelled,
+NEARER = 0.5  # of those nearer than this share of its distance from the mean frame
 MAP, CELLS = "map.npz", "map.toml"
 ARRAYS = ("mean", "components", "neurons", "accepted")
 AGAIN = "make it by `realizer corpus learn`"
@@ -44,10 +44,10 @@ class FaceMap:
     accepted: Float64  # (SIDE * SIDE,) distance up to which a frame belongs to a neuron
     names: tuple[str, ...]  # expression of each neuron; "" for none
 
-    def places(self, frames: Float64) -> Float64:
-        """Return frames (n, d) as (n, k) by their components."""
-        placed: Float64 = (frames - self.mean) @ self.components.T
-        return placed
+    def project(self, frames: Float64) -> Float64:
+        """Return the principal components (n, k) of frames (n, d)."""
+        projected: Float64 = (frames - self.mean) @ self.components.T
+        return projected
 
 
 def faps_of(rows: Float32) -> Float64:
@@ -56,7 +56,11 @@ def faps_of(rows: Float32) -> Float64:
 
 
 def features(recording: Recording) -> Float64:
-    """Return frames (n, d) in mm: FAPs of the face, or points without the head's pose; or CorpusError."""
+    """Return frames (n, d) in mm: FAPs of the face, or points without the head's pose.
+
+    Raises:
+        CorpusError: the recording has neither.
+    """
     if recording.faps is not None:
         scale = np.array([MILLIMETRES[row.unit] for row in faps()])
         scale[HEAD_COLUMNS] = 0.0
@@ -67,9 +71,9 @@ def features(recording: Recording) -> Float64:
     flat = points.reshape(len(points), -1).copy()
     frames = np.arange(len(flat))
     for column in flat.T:  # lost points are interpolated
-        there = np.isfinite(column)
-        column[:] = np.interp(frames, frames[there], column[there]) if there.any() else 0.0
-    # Centred, of unit size and turned like their median (7.2.1; Kabsch 1976).
+        known = np.isfinite(column)
+        column[:] = np.interp(frames, frames[known], column[known]) if known.any() else 0.0
+    # Points are centred, scaled to unit size and rotated to their median (7.2.1; Kabsch 1976).
     centred = flat.reshape(points.shape) - flat.reshape(points.shape).mean(axis=1, keepdims=True)
     centred /= max(float(np.sqrt(np.square(centred).sum(axis=(1, 2)).mean())), 1e-12)
     u, _, vt = np.linalg.svd(np.einsum("nki,kj->nij", centred, np.median(centred, axis=0)))
@@ -78,43 +82,43 @@ def features(recording: Recording) -> Float64:
 
 
 def learn(recordings: Sequence[Recording], seed: int = 0) -> FaceMap:
-    """Return the map of the faces of recordings, its neurons named by labels or else by templates.
+    """Return the map of the faces of recordings, with neurons named by labels, or else by templates.
 
     Raises:
-        CorpusError: recordings without frames, with different points, or too few frames that differ.
+        CorpusError: recordings without frames, with different points, or with too few different frames.
     """
     frames = [features(recording) for recording in recordings]
     if len({part.shape[1] for part in frames}) != 1:
         raise CorpusError("wanted FAPs, or the same points, in all recordings; got others or no recordings")
-    whole = np.concatenate(frames)
-    mean = whole.mean(axis=0)
-    _, sizes, components = np.linalg.svd(whole - mean, full_matrices=False)
+    data = np.concatenate(frames)
+    mean = data.mean(axis=0)
+    _, sizes, components = np.linalg.svd(data - mean, full_matrices=False)
     shares = np.cumsum(np.square(sizes)) / max(float(np.square(sizes).sum()), 1e-12)
     components = components[: int(np.searchsorted(shares, VARIANCE)) + 1]
-    places = (whole - mean) @ components.T
-    away = np.linalg.norm(places, axis=1)
-    far = np.asarray(away >= np.quantile(away, 1 - FAR))
-    if far.sum() < SIDE * SIDE or away.max() < 1e-9:
+    projected = (data - mean) @ components.T
+    distance = np.linalg.norm(projected, axis=1)
+    far = np.asarray(distance >= np.quantile(distance, 1 - FAR))
+    if far.sum() < SIDE * SIDE or distance.max() < 1e-9:
         raise CorpusError(
-            f"wanted {SIDE * SIDE / FAR:.0f} frames that differ, got {len(whole)}; add recordings"
+            f"wanted {SIDE * SIDE / FAR:.0f} frames that differ, got {len(data)}; add recordings"
         )
-    neurons = train(places[far], seed)
-    near = distances(places, neurons)
+    neurons = train(projected[far], seed)
+    near = distances(projected, neurons)
     nearest = near.argmin(axis=1)
-    own = [np.asarray(far & (nearest == k)) for k in range(SIDE * SIDE)]
+    neuron_frames = [np.asarray(far & (nearest == k)) for k in range(SIDE * SIDE)]
     labels = _labels(recordings, [len(part) for part in frames])
-    names = _by_labels(own, labels) if labels else _by_templates(own, whole)
+    names = _by_labels(neuron_frames, labels) if labels else _by_templates(neuron_frames, data)
     accepted = [
-        _acceptance(near[:, k], mine, NEARER * float(np.linalg.norm(neurons[k])), labels.get(name))
-        if name and mine.any()
+        _acceptance(near[:, k], frames_of, NEARER * float(np.linalg.norm(neurons[k])), labels.get(name))
+        if name and frames_of.any()
         else 0.0
-        for k, (mine, name) in enumerate(zip(own, names, strict=True))
+        for k, (frames_of, name) in enumerate(zip(neuron_frames, names, strict=True))
     ]
     return FaceMap(mean, components, neurons, np.array(accepted), names)
 
 
 def train(frames: Float64, seed: int = 0) -> Float64:
-    """Return the neurons (SIDE * SIDE, k) of a self-organising map of frames (n, k), trained in batches."""
+    """Return the neurons (SIDE * SIDE, k) of a self-organising map of frames (n, k), by batch training."""
     grid = np.indices((SIDE, SIDE)).reshape(2, -1).T
     apart = np.square(grid[:, None] - grid).sum(axis=-1)
     neurons = frames[np.random.default_rng(seed).choice(len(frames), SIDE * SIDE, replace=False)]
@@ -132,7 +136,7 @@ def distances(frames: Float64, neurons: Float64) -> Float64:
 
 
 def borders(neurons: Float64) -> Float64:
-    """Return the U-matrix (2 * SIDE - 1, 2 * SIDE - 1): distances of neighbours, and means of them."""
+    """Return the U-matrix (2 * SIDE - 1, 2 * SIDE - 1): distances of neighbours, and their means."""
     cells = neurons.reshape(SIDE, SIDE, -1)
     found = np.zeros((2 * SIDE - 1, 2 * SIDE - 1))
     found[::2, 1::2] = np.linalg.norm(cells[:, 1:] - cells[:, :-1], axis=-1)
@@ -143,14 +147,14 @@ def borders(neurons: Float64) -> Float64:
 
 
 def picture(learnt: FaceMap, cell: int = 28) -> UInt8:
-    """Return the U-matrix as a grey picture: dark between neurons that differ, as in her figure 7.16."""
+    """Return the U-matrix as a grey picture, dark between different neurons, as in Wojdel's figure 7.16."""
     matrix = borders(learnt.neurons)
     grey = 255 - 230 * (matrix - matrix.min()) / max(float(np.ptp(matrix)), 1e-12)
     return np.kron(grey, np.ones((cell, cell))).astype(np.uint8)
 
 
 def save(folder: Path, learnt: FaceMap) -> None:
-    """Write the map, its picture, and the names of its neurons, which may be changed by hand."""
+    """Write the map, its picture, and the names of its neurons, which can be edited."""
     from PIL import Image
 
     arrays = {name: getattr(learnt, name) for name in ARRAYS}
@@ -163,7 +167,7 @@ def save(folder: Path, learnt: FaceMap) -> None:
 
 
 def load(folder: Path) -> FaceMap:
-    """Return the map of a corpus; raises CorpusError: no map, or one that cannot be used."""
+    """Return the map of a corpus; raises CorpusError if there is none, or it is damaged."""
     try:
         with np.load(folder / MAP, allow_pickle=False) as data:
             mean, components, neurons, accepted = (np.asarray(data[name], np.float64) for name in ARRAYS)
@@ -177,39 +181,41 @@ def load(folder: Path) -> FaceMap:
 
 
 def _labels(recordings: Sequence[Recording], counts: Sequence[int]) -> dict[str, Bool]:
-    """Return expression -> which frames of all recordings show it; {} if nobody has labelled any."""
+    """Return expression -> whether each frame of all recordings is labelled with it; {} without labels."""
     found: dict[str, Bool] = {}
     start = 0
     for recording, count in zip(recordings, counts, strict=True):
         for one in recording.segments():
-            shown = found.setdefault(one.text, np.zeros(sum(counts), bool))
-            shown[start + min(one.first, count) : start + min(one.last + 1, count)] = True
+            labelled = found.setdefault(one.text, np.zeros(sum(counts), bool))
+            labelled[start + min(one.first, count) : start + min(one.last + 1, count)] = True
         start += count
     return found
 
 
-def _by_labels(own: Sequence[Bool], labels: Mapping[str, Bool]) -> tuple[str, ...]:
-    """Return the most frequent label of each neuron's own frames, or "" if it is not that of a majority."""
+def _by_labels(neuron_frames: Sequence[Bool], labels: Mapping[str, Bool]) -> tuple[str, ...]:
+    """Return the most frequent label of each neuron's frames, or "" if fewer than half have it."""
     names = []
-    for mine in own:
-        name = max(labels, key=lambda one: int((labels[one] & mine).sum()))
-        count = int((labels[name] & mine).sum())
-        names.append(name if count > 0 and count >= MAJORITY * mine.sum() else "")
+    for frames in neuron_frames:
+        name = max(labels, key=lambda one: int((labels[one] & frames).sum()))
+        count = int((labels[name] & frames).sum())
+        names.append(name if count > 0 and count >= MAJORITY * frames.sum() else "")
     return tuple(names)
 
 
-def _by_templates(own: Sequence[Bool], whole: Float64) -> tuple[str, ...]:
-    """Return the template nearest to how each neuron's own frames differ from the median face.
+def _by_templates(neuron_frames: Sequence[Bool], data: Float64) -> tuple[str, ...]:
+    """Return the template nearest to the difference between each neuron's mean and the median face.
 
-    It is "" where none is near; frames of points have no templates.
+    It is "" if none is near, or if the frames are points, for which there are no templates.
     """
-    if whole.shape[1] != 68:
-        return ("",) * len(own)
-    ways = features(Recording("", faps=np.stack(list(template_faps().values()))))
-    still, names = np.median(whole, axis=0), []
-    for mine in own:
-        move = whole[mine].mean(axis=0) - still if mine.any() else still * 0
-        cosines = ways @ move / np.maximum(np.linalg.norm(ways, axis=1) * np.linalg.norm(move), 1e-12)
+    if data.shape[1] != 68:
+        return ("",) * len(neuron_frames)
+    directions = features(Recording("", faps=np.stack(list(template_faps().values()))))
+    median, names = np.median(data, axis=0), []
+    for frames in neuron_frames:
+        move = data[frames].mean(axis=0) - median if frames.any() else median * 0
+        cosines = (
+            directions @ move / np.maximum(np.linalg.norm(directions, axis=1) * np.linalg.norm(move), 1e-12)
+        )
         names.append(list(template_faps())[cosines.argmax()] if cosines.max() >= LIKE else "")
     return tuple(names)
 
@@ -217,21 +223,22 @@ def _by_templates(own: Sequence[Bool], whole: Float64) -> tuple[str, ...]:
 @cache
 def template_faps() -> Mapping[str, Float64]:
     """Return the FAPs (68,) of each template, by its name in lower case."""
-    shown = faps_of(np.stack([au_row(template.aus) for template in templates().values()]))
-    return {name.lower(): row for name, row in zip(templates(), shown, strict=True)}
+    rows = faps_of(np.stack([au_row(template.aus) for template in templates().values()]))
+    return {name.lower(): row for name, row in zip(templates(), rows, strict=True)}
 
 
-def _acceptance(away: Float64, mine: Bool, limit: float, shown: Bool | None) -> float:
-    """Return the distance up to which most frames show what a neuron shows (7.3.2, figure 7.17).
+def _acceptance(distances: Float64, own_frames: Bool, limit: float, labelled: Bool | None) -> float:
+    """Return the distance up to which most frames have a neuron's expression (7.3.2, figure 7.17).
 
     Args:
-        away: distances of all frames; mine: the neuron's own frames; shown: those that show it, if known.
-        limit: the greatest distance if that is not known.
+        distances: of all frames; own_frames: those nearest to the neuron; labelled: those with its
+            expression, None without labels.
+        limit: the largest distance without labels.
     """
-    if shown is None:
-        return min(float(np.quantile(away[mine], USUAL)), limit)
-    order = np.argsort(away, kind="stable")
-    right = np.convolve(shown[order], np.ones(RECENT))[: len(order)]
+    if labelled is None:
+        return min(float(np.quantile(distances[own_frames], USUAL)), limit)
+    order = np.argsort(distances, kind="stable")
+    right = np.convolve(labelled[order], np.ones(RECENT))[: len(order)]
     wrong = np.flatnonzero(right < MAJORITY * np.minimum(np.arange(1, len(order) + 1), RECENT))
     last = int(wrong[0]) if len(wrong) else len(order)
-    return float(away[order[last - 1]]) if last else 0.0
+    return float(distances[order[last - 1]]) if last else 0.0

@@ -1,4 +1,4 @@
-"""Recordings of a corpus: a folder each, with FAPs, feature points, labels, words and facts."""
+"""Recordings of a corpus: folders with FAPs, feature points, labels, words and metadata."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ CORPUS, META, FAPS, POINTS = "corpus.toml", "meta.toml", "faps.csv", "points.npz
 LABELS, WORDS = "labels.csv", "words.csv"
 COLUMNS = {LABELS: ["start", "end", "expression", "annotator"], WORDS: ["start", "end", "word", "speaker"]}
 FACTS = ("person", "mood", "fragment", "language", "licence")  # beside fps and frames
-SUBJECT = "subject"  # speaker whose face is recorded, beside the person's name
+SUBJECT = "subject"  # alias of the recorded person as speaker
 MAX_FRAMES = 1_000_000
 
 
 class CorpusError(TableError):
-    """A file of a corpus that cannot be used; the message names it and what to do."""
+    """A file of a corpus cannot be used; the message names it and a remedy."""
 
 
 @dataclass(frozen=True, slots=True)
 class Annotation:
-    """An expression or a word from `start` to `end` seconds, and who labelled or said it."""
+    """An expression or a word from `start` to `end` seconds, with its annotator or speaker `by`."""
 
     start: float
     end: float
@@ -44,8 +44,8 @@ class Annotation:
 
     def __post_init__(self) -> None:
         if not (0 <= self.start <= self.end < MAX_FRAMES and self.text):
-            got = f"{self.text!r} from {self.start:g} to {self.end:g}"
-            raise ValueError(f"a text, a start and a later end in seconds are wanted, got {got}")
+            given = f"{self.text!r} from {self.start:g} to {self.end:g}"
+            raise ValueError(f"a text, a start and a later end in seconds are wanted, got {given}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +61,11 @@ class Segment:
         return self.last - self.first + 1
 
     def annotation(self, fps: float) -> Annotation:
-        """Return it in seconds."""
+        """Return the segment in seconds."""
         return Annotation(self.first / fps, (self.last + 1) / fps, self.text, self.by)
 
     def gap(self, other: Segment) -> int:
-        """Return the frames between both, 0 if they adjoin, less if they share frames (eq. 6.12)."""
+        """Return the number of frames between both: 0 if they adjoin, negative if they overlap (eq. 6.12)."""
         return max(self.first - other.last, other.first - self.last) - 1
 
 
@@ -89,11 +89,11 @@ class Recording:
 
     @cached_property
     def frames(self) -> int:
-        """The number of frames: of the FAPs or points, or at least to the last label or word."""
+        """The number of frames of the FAPs or points, and at least up to the last label or word."""
         last = max((one.end for one in (*self.labels, *self.words)), default=0.0)
         parts = self.faps, self.points and self.points[1]
-        known = [len(part) for part in parts if part is not None]
-        return max([*known, int(self.meta.get("frames", 0)), math.ceil(last * self.fps - 1e-6)])
+        lengths = [len(part) for part in parts if part is not None]
+        return max([*lengths, int(self.meta.get("frames", 0)), math.ceil(last * self.fps - 1e-6)])
 
     @property
     def has_frames(self) -> bool:
@@ -104,15 +104,17 @@ class Recording:
         return sorted({label.by for label in self.labels})
 
     def segments(self, annotator: str | None = None) -> list[Segment]:
-        """Return the expressions in frames, in order; of one annotator, or of the first."""
-        wanted = annotator if annotator is not None else next(iter(self.annotators), "")
-        return self._in_frames(label for label in self.labels if label.by == wanted)
+        """Return the expressions of an annotator, by default the first, as segments in order."""
+        selected = annotator if annotator is not None else next(iter(self.annotators), "")
+        return self._in_frames(label for label in self.labels if label.by == selected)
 
     @cached_property
     def spoken(self) -> list[Segment]:
-        """The words in frames; `by` is "subject" if the recorded person speaks, else "other"."""
-        own = {SUBJECT, "", self.meta.get("person", SUBJECT)}
-        return self._in_frames(replace(one, by=SUBJECT if one.by in own else "other") for one in self.words)
+        """The words as segments; `by` is "subject" if the recorded person speaks, otherwise "other"."""
+        subject_names = {SUBJECT, "", self.meta.get("person", SUBJECT)}
+        return self._in_frames(
+            replace(one, by=SUBJECT if one.by in subject_names else "other") for one in self.words
+        )
 
     def _in_frames(self, spans: Iterable[Annotation]) -> list[Segment]:
         starts = ((round(span.start * self.fps), span) for span in spans)
@@ -141,7 +143,7 @@ def read_recording(folder: Path) -> Recording:
 
 
 def read_parts(folder: Path) -> Recording:
-    """Return what a folder has of a recording, even if it has no facts; raises CorpusError."""
+    """Return a recording from a folder that may have no metadata; raises CorpusError."""
     path = folder / META
     try:
         meta = parse_toml(path.read_text("utf-8")) if path.is_file() else {}
@@ -158,15 +160,15 @@ def read_parts(folder: Path) -> Recording:
             values = read_faps(path.read_text("utf-8"))[0]
         if (path := folder / POINTS).is_file():
             with np.load(path, allow_pickle=False) as data:
-                names, places = tuple(map(str, data["names"])), np.asarray(data["points"], np.float64)
-            points = names, places.reshape(len(places), len(names), 3)
+                names, positions = tuple(map(str, data["names"])), np.asarray(data["points"], np.float64)
+            points = names, positions.reshape(len(positions), len(names), 3)
     except (OSError, ValueError, TypeError, KeyError, EOFError) as error:
         raise CorpusError(f"{path}: wanted a file of a recording, got: {error}; add it again") from None
     return Recording(folder.name, meta, spans.get(LABELS, ()), spans.get(WORDS, ()), values, points)
 
 
 def write_recording(folder: Path, recording: Recording) -> None:
-    """Write a recording; its facts come last, so that what is half written is seen."""
+    """Write a recording; the metadata are last, so that incomplete recordings are recognised."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, spans in ((LABELS, recording.labels), (WORDS, recording.words)):
         if spans or (folder / name).exists():
@@ -200,20 +202,20 @@ def read_annotations(text: str) -> tuple[Annotation, ...]:
 
 
 def read_faps(text: str) -> tuple[Float64, float]:
-    """Return the FAPs (n, 68) of a CSV with time and names of FAPs, and its rate; raises ValueError."""
+    """Parse a CSV with columns time and FAP names; return FAPs (n, 68) and the rate; raises ValueError."""
     columns = numbers(text)
-    places = [row.fap - 1 for row in faps() if row.name in columns]
-    if "time" not in columns or not places:
+    columns_ = [row.fap - 1 for row in faps() if row.name in columns]
+    if "time" not in columns or not columns_:
         raise ValueError(f"no column time, or no columns named as FAPs, but {','.join(columns)[:80]}")
     values = np.zeros((len(columns["time"]), 68))
-    values[:, places] = np.stack([columns[faps()[place].name] for place in places], axis=1)
+    values[:, columns_] = np.stack([columns[faps()[column].name] for column in columns_], axis=1)
     if not np.isfinite(values).all() or not 0 < len(values) <= MAX_FRAMES:
         raise ValueError(f"values that are not finite, none, or more than {MAX_FRAMES}")
     return values, rate_of(columns["time"])
 
 
 def numbers(text: str) -> dict[str, Float64]:
-    """Return the columns of a CSV; cells that are no numbers are NaN."""
+    """Parse a CSV into columns, with NaN for cells that are no numbers."""
 
     def number(cell: str) -> float:
         try:
@@ -230,7 +232,7 @@ def numbers(text: str) -> dict[str, Float64]:
 
 
 def rate_of(times: Float64) -> float:
-    """Return the frames per second of times in seconds; 25 if they do not tell."""
+    """Return the frames per second of times in seconds, 25 for fewer than two different times."""
     usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     return round(1 / usual, 3) if usual > 0 else 25.0
 
@@ -239,23 +241,24 @@ Spans = Iterable[tuple[float, float, str]]
 
 
 def change(recording: Recording, annotator: str, added: Spans = (), removed: Spans = ()) -> Recording:
-    """Return a recording without and with segments of an annotator, in order of time.
+    """Return a recording with segments of an annotator removed and added.
 
-    Segments are (start, end, expression), in seconds. One that is removed may be half a frame off.
+    Segments are (start, end, expression), in seconds. Removed ones are matched within half a frame.
 
     Raises:
-        CorpusError: a segment that is no segment, is not there, lies behind the end, or overlaps another one
-            of the same expression.
+        CorpusError: a removed segment does not exist, or an added one is invalid, ends after the recording,
+        or
+            overlaps another one of the same expression.
     """
     labels, slack = list(recording.labels), 0.5 / recording.fps + 1e-6
     for start, end, text in removed:
         same = [one for one in labels if (one.text, one.by) == (text, annotator)]
         near = [one for one in same if abs(one.start - start) <= slack and abs(one.end - end) <= slack]
         if not near:
-            there = ", ".join(f"{one.start:g} to {one.end:g}" for one in same) or "none"
+            existing = ", ".join(f"{one.start:g} to {one.end:g}" for one in same) or "none"
             raise CorpusError(
                 f"{recording.name}: wanted a segment of {text!r} by {annotator!r} to remove, got "
-                f"{start:g} to {end:g}; there are {there}"
+                f"{start:g} to {end:g}; there are {existing}"
             )
         labels.remove(near[0])
     last = recording.frames / recording.fps if recording.has_frames else float("inf")

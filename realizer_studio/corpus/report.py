@@ -1,4 +1,4 @@
-"""The description of a corpus as files: a CSV for each table, and one HTML report."""
+"""A writer of the description of a corpus: a CSV for each table, and an HTML report."""
 
 from base64 import b64encode
 from collections.abc import Mapping, Sequence
@@ -22,7 +22,7 @@ STYLE = (
 
 
 def describe(folder: Path, study: Study, corpus: Path) -> list[str]:
-    """Write tables, rules and the report, with the map of the corpus, to a folder; return names of files."""
+    """Write tables, rules, the report and the map of the corpus to a folder; return the files' names."""
     folder.mkdir(parents=True, exist_ok=True)
     tables = [make(study) for make in TABLES]
     tables += [agreement(study.recordings)] if any(len(r.annotators) > 1 for r in study.recordings) else []
@@ -42,7 +42,7 @@ def write_tables(folder: Path, tables: Sequence[Table]) -> None:
 
 
 def html(title: str, tables: Sequence[Table], pictures: Mapping[str, Sequence[bytes]]) -> str:
-    """Return a page with all tables, and pictures (PNG or WebP) by their captions."""
+    """Return a page with tables, and pictures (PNG or WebP) with their captions."""
     parts = [
         f"<!DOCTYPE html><meta charset=utf-8><title>{title}</title><style>{STYLE}</style><h1>{title}</h1>"
     ]
@@ -54,10 +54,10 @@ def html(title: str, tables: Sequence[Table], pictures: Mapping[str, Sequence[by
         )
     parts += ["<h2>Pictures</h2>"] if pictures else []
     for caption, files in pictures.items():
-        shown = [
+        images = [
             f'<img alt="" src="data:image/{_kind(file)};base64,{b64encode(file).decode()}">' for file in files
         ]
-        parts.append(f"<figure>{' '.join(shown)}<figcaption>{escape(caption)}</figcaption></figure>")
+        parts.append(f"<figure>{' '.join(images)}<figcaption>{escape(caption)}</figcaption></figure>")
     return "\n".join(parts) + "\n"
 
 

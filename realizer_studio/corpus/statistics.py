@@ -12,14 +12,14 @@ import numpy as np
 from realizer.tables.emotional_words import WordList
 from realizer_studio.corpus.recording import SUBJECT, Recording, Segment
 
-NEAR = 12  # frames at 25 a second between an expression and a word that it belongs to (eq. 6.13)
-FEWEST = 7  # segments that have a standard deviation, and occurrences of a word that has a row
+NEAR = 12  # frames at 25 a second, the largest gap between an expression and its word (eq. 6.13)
+FEWEST = 7  # least number of segments for a standard deviation, and of occurrences of a word for a row
 SHORT = 5  # words of a short question
 DRAWS = 1000  # of the bootstrap
 RELATIONS = ("a then b", "b then a", "b in a", "a in b", "a = b")
 SPEAKERS = ("subject", "other", "subject to other", "other to subject", "nobody")
 NEIGHBOURS = ("before", "after", "before within 1 s", "after within 1 s")
-KINDS: dict[str, Callable[[int, str], bool]] = {  # of sentences, by their number of words and last sign
+KINDS: dict[str, Callable[[int, str], bool]] = {  # of sentences, by number of words and final sign
     "single-word question": lambda words, sign: sign == "?" and words == 1,
     "short question": lambda words, sign: sign == "?" and 1 < words <= SHORT,
     "long question": lambda words, sign: sign == "?" and words > SHORT,
@@ -29,7 +29,7 @@ KINDS: dict[str, Callable[[int, str], bool]] = {  # of sentences, by their numbe
 
 @dataclass(frozen=True)
 class Table:
-    """A table: `name` of its file, title, columns and rows; None is an empty cell."""
+    """A table with the `name` of its file, a title, columns and rows; None is an empty cell."""
 
     name: str
     title: str
@@ -43,12 +43,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Study:
-    """Recordings with one annotator's segments."""
+    """Recordings with the segments of one annotator."""
 
     recordings: Sequence[Recording]  # at least one
-    annotator: str | None = None  # whose labels count; None: the first of each recording
-    words: WordList | None = None  # emotional words; None: there are none
-    watched: frozenset[str] = frozenset()  # words that have a row in table 6.11 however rare they are
+    annotator: str | None = None  # None for the first annotator of each recording
+    words: WordList | None = None  # emotional words, or None
+    watched: frozenset[str] = frozenset()  # words with a row in table 6.11 even if they are rare
 
     @cached_property
     def parts(self) -> list[tuple[Recording, list[Segment]]]:
@@ -70,7 +70,7 @@ class Study:
 
     @cached_property
     def linked(self) -> list[tuple[str, str, str, frozenset[str]]]:
-        """Word, category or "", speaker, and the expressions within half a second (eq. 6.12, 6.13)."""
+        """Word, category or "", speaker, and expressions within half a second (eq. 6.12, 6.13)."""
         found = []
         for recording, segments in self.parts:
             texts = [plain(word.text) for word in recording.spoken]
@@ -82,37 +82,41 @@ class Study:
 
 
 def plain(word: str) -> str:
-    """Return a word in lower case without signs around it."""
+    """Return a word in lower case without punctuation."""
     return word.strip(" .,;:!?…\"'“”‘’«»()-–").lower()
 
 
 def counts(study: Study) -> Table:
-    """Table 6.3, and rows of all segments and of the frames with one, two or more of them."""
+    """Return table 6.3, with rows for all segments, and for frames with none, one, and several of them."""
     lengths = {name: _lengths(study.every, name) for name in (*study.totals, None)}
-    rows: list[tuple[Any, ...]] = [(name or "all", len(own), sum(own)) for name, own in lengths.items()]
-    shown = np.concatenate([_shown(*part) for part in study.parts])
-    rows += [(f"frames with {k}", None, int((np.minimum(shown, 2) == k).sum())) for k in (0, 1, 2)]
+    rows: list[tuple[Any, ...]] = [
+        (name or "all", len(lengths_of), sum(lengths_of)) for name, lengths_of in lengths.items()
+    ]
+    per_frame = np.concatenate([_expressions_per_frame(*part) for part in study.parts])
+    rows += [(f"frames with {k}", None, int((np.minimum(per_frame, 2) == k).sum())) for k in (0, 1, 2)]
     rows = [(*row, _percent(row[2], study.frames)) for row in rows]
     return Table("6.3", "Segments and frames", ("expression", "segments", "frames", "percent"), tuple(rows))
 
 
 def lengths(study: Study) -> Table:
-    """Table 6.4; the deviation of expressions with at least seven segments."""
+    """Return table 6.4; the deviation is that of expressions with at least seven segments."""
     rows = []
     for name in study.totals:
-        own = _lengths(study.every, name)
-        deviation = float(np.std(own, ddof=1)) if len(own) >= FEWEST else None
-        rows.append((name, min(own), max(own), float(np.mean(own)), deviation))
+        values = _lengths(study.every, name)
+        deviation = float(np.std(values, ddof=1)) if len(values) >= FEWEST else None
+        rows.append((name, min(values), max(values), float(np.mean(values)), deviation))
     columns = "expression", "shortest", "longest", "mean", "deviation"
     return Table("6.4", "Lengths of segments, frames", columns, tuple(rows))
 
 
 def distances(study: Study) -> Table:
-    """Table 6.5: D_k(i) and D_k in seconds (eq. 6.2, 6.3) of each fragment; "inf" of a single appearance."""
+    """Return table 6.5: D_k(i) and D_k in seconds (eq. 6.2, 6.3) by fragment; "inf" for one segment."""
 
-    def distance(recording: Recording, own: list[int]) -> float | None:
-        mean = (recording.frames - sum(own)) / (recording.fps * len(own)) if own else None
-        return float("inf") if len(own) == 1 else mean
+    def distance(recording: Recording, lengths_of: list[int]) -> float | None:
+        mean = (
+            (recording.frames - sum(lengths_of)) / (recording.fps * len(lengths_of)) if lengths_of else None
+        )
+        return float("inf") if len(lengths_of) == 1 else mean
 
     rows = [
         (
@@ -125,10 +129,10 @@ def distances(study: Study) -> Table:
 
 
 def shares(study: Study) -> Table:
-    """Table 6.6, with the mood of each fragment."""
+    """Return table 6.6, with the mood of each fragment."""
     rows = []
     for name, (recording, segments) in zip(_fragments(study), study.parts, strict=True):
-        expressive = int((_shown(recording, segments) > 0).sum())
+        expressive = int((_expressions_per_frame(recording, segments) > 0).sum())
         mean = float(np.mean(_lengths(segments, None))) if segments else None
         rows.append((name, recording.meta.get("mood", ""), _percent(expressive, recording.frames), mean))
     columns = "fragment", "mood", "expressive percent", "mean length"
@@ -136,7 +140,7 @@ def shares(study: Study) -> Table:
 
 
 def relation(a: Segment, b: Segment) -> str:
-    """Return how two segments that share frames lie (table 6.8)."""
+    """Return the relation of two overlapping segments (table 6.8)."""
     if (a.first, a.last) == (b.first, b.last):
         return "a = b"
     if a.first <= b.first and b.last <= a.last:
@@ -147,7 +151,7 @@ def relation(a: Segment, b: Segment) -> str:
 
 
 def blends(study: Study) -> Table:
-    """Tables 6.7 and 6.8: expressions that share frames, a and b in order of the alphabet."""
+    """Return tables 6.7 and 6.8: pairs of overlapping expressions a and b, in alphabetical order."""
     found: dict[tuple[str, str], list[tuple[int, str]]] = {}
     for _, segments in study.parts:
         for pair in combinations(segments, 2):
@@ -157,22 +161,22 @@ def blends(study: Study) -> Table:
                 found.setdefault((a.text, b.text), []).append((shared, relation(a, b)))
     rows = []
     for (one, two), some in sorted(found.items(), key=lambda item: -len(item[1])):
-        frames, ways = [shared for shared, _ in some], Counter(way for _, way in some)
+        frames, relations = [shared for shared, _ in some], Counter(kind for _, kind in some)
         figures = len(some), sum(frames), min(frames), max(frames)
-        rows.append((f"{one} & {two}", one, two, *figures, *(ways[way] for way in RELATIONS)))
+        rows.append((f"{one} & {two}", one, two, *figures, *(relations[kind] for kind in RELATIONS)))
     columns = "blend", "a", "b", "count", "frames", "shortest", "longest", *RELATIONS
     return Table("6.7-6.8", "Expressions that share frames", columns, tuple(rows))
 
 
 def neighbours(study: Study) -> Table:
-    """Neighbours (6.3.3): shares of segments that another one precedes or follows directly, or within 1 s."""
+    """Return the shares of segments with a neighbour directly before or after, or within 1 s (6.3.3)."""
     found: Counter[tuple[str, str, str]] = Counter()
     for recording, segments in study.parts:
         for a in segments:
             near = [(b, "before" if b.first < a.first else "after") for b in segments if b is not a]
-            seen = {(b.text, f"{side} within 1 s") for b, side in near if a.gap(b) <= recording.fps}
-            seen |= {(b.text, side) for b, side in near if a.gap(b) <= 0}
-            found.update((a.text, other, side) for other, side in seen)
+            relations = {(b.text, f"{side} within 1 s") for b, side in near if a.gap(b) <= recording.fps}
+            relations |= {(b.text, side) for b, side in near if a.gap(b) <= 0}
+            found.update((a.text, other, side) for other, side in relations)
     pairs = sorted({(a, b) for a, b, _ in found}, key=lambda pair: (-study.totals[pair[0]], pair))
     rows = tuple(
         (f"{a}, {b}", a, b, total, *(_percent(found[a, b, side], total) for side in NEIGHBOURS))
@@ -184,13 +188,15 @@ def neighbours(study: Study) -> Table:
 
 
 def speakers(study: Study) -> Table:
-    """Table 6.9: whose text expressions accompany (eq. 6.11)."""
+    """Return table 6.9: the speakers of the words that expressions accompany (eq. 6.11)."""
     found: Counter[tuple[str, str]] = Counter()
     for recording, segments in study.parts:
         for one in segments:
-            said = [word.by for word in recording.spoken if word.gap(one) < 0] or ["nobody"]
+            voices = [word.by for word in recording.spoken if word.gap(one) < 0] or ["nobody"]
             changes = (
-                said[0] if len({*said}) == 1 else f"{said[0]} to {'other' if said[0] == SUBJECT else SUBJECT}"
+                voices[0]
+                if len({*voices}) == 1
+                else f"{voices[0]} to {'other' if voices[0] == SUBJECT else SUBJECT}"
             )
             found[one.text, changes] += 1
     rows = tuple(
@@ -201,12 +207,12 @@ def speakers(study: Study) -> Table:
 
 
 def sentences(recording: Recording) -> Iterator[tuple[list[Segment], str]]:
-    """Yield the words of the subject's sentences, and the sign that ends each."""
+    """Yield the words of the subject's sentences, and their final signs."""
     words: list[Segment] = []
     for word, following in zip(recording.spoken, [*recording.spoken[1:], None], strict=False):
         if plain(word.text):
             words.append(word)
-        elif words:  # a sign by itself
+        elif words:  # a separate punctuation mark
             words[-1] = Segment(words[-1].first, word.last, words[-1].text + word.text, words[-1].by)
         sign = word.text.rstrip("\"'”’»)")[-1:]
         ends = sign in ".?!…" and not (following is not None and not plain(following.text))
@@ -217,25 +223,25 @@ def sentences(recording: Recording) -> Iterator[tuple[list[Segment], str]]:
 
 
 def questions(study: Study) -> Table:
-    """Table 6.10: expressions of the subject's questions, by their number of words, and exclamations."""
+    """Return table 6.10: expressions in the subject's questions, by number of words, and exclamations."""
     found: Counter[tuple[str, str]] = Counter()
     for recording, segments in study.parts:
         for words, sign in sentences(recording):
             span = Segment(words[0].first, words[-1].last, "")
-            shown = {"all", *(one.text for one in segments if one.gap(span) < 0)}
+            expressions = {"all", *(one.text for one in segments if one.gap(span) < 0)}
             kinds = [kind for kind, fits in KINDS.items() if fits(len(words), sign)]
-            found.update((name, kind) for name in shown for kind in kinds)
+            found.update((name, kind) for name in expressions for kind in kinds)
     rows = tuple((name, *(found[name, kind] for kind in KINDS)) for name in [*study.totals, "all"])
     return Table("6.10", "Expressions of questions and exclamations", ("expression", *KINDS), rows)
 
 
 def words(study: Study) -> Table:
-    """Table 6.11: expressions at words of the subject that are frequent, or watched."""
-    said = [(text, shown) for text, _, by, shown in study.linked if by == SUBJECT and text]
-    found = Counter((text, name) for text, shown in said for name in shown)
+    """Return table 6.11: expressions at the subject's frequent words, and at watched ones."""
+    occurrences = [(text, expressions) for text, _, by, expressions in study.linked if by == SUBJECT and text]
+    found = Counter((text, name) for text, expressions in occurrences for name in expressions)
     usual = [
         (text, count)
-        for text, count in Counter(text for text, _ in said).most_common()
+        for text, count in Counter(text for text, _ in occurrences).most_common()
         if count >= FEWEST or text in study.watched
     ]
     rows = tuple((text, count, *(found[text, name] for name in study.totals)) for text, count in usual)
@@ -243,13 +249,15 @@ def words(study: Study) -> Table:
 
 
 def emotional(study: Study) -> Table:
-    """Table 6.12: words with an expression within half a second."""
+    """Return table 6.12: words with an expression within half a second."""
     rows = []
-    for who, speakers_of in (("all", (SUBJECT, "other")), (SUBJECT, (SUBJECT,)), ("other", ("other",))):
-        row: list[Any] = [who]
-        for wanted in (False, True):
+    for speaker, speakers_of in (("all", (SUBJECT, "other")), (SUBJECT, (SUBJECT,)), ("other", ("other",))):
+        row: list[Any] = [speaker]
+        for is_emotional in (False, True):
             some = [
-                shown for _, kind, by, shown in study.linked if by in speakers_of and bool(kind) == wanted
+                expressions
+                for _, kind, by, expressions in study.linked
+                if by in speakers_of and bool(kind) == is_emotional
             ]
             row += [len(some), sum(map(bool, some)), _percent(sum(map(bool, some)), len(some))]
         rows.append(tuple(row))
@@ -259,20 +267,25 @@ def emotional(study: Study) -> Table:
 
 
 def categories(study: Study, seed: int = 0) -> Table:
-    """Figure 6.11: expressions at words of each category, with odds ratios and their 95 % intervals.
+    """Return figure 6.11: expressions at words of each category, with odds ratios and 95 % intervals.
 
-    The odds ratio compares the subject's words of the category with all others of theirs, half an occurrence
-    added to each cell (Haldane); the interval is a bootstrap of words.
+    The odds ratio compares the subject's words of the category with the subject's other words; half an
+    occurrence is added to each cell (Haldane). The interval is computed by a bootstrap of words.
     """
     chance = np.random.default_rng(seed)
-    said = [(kind, shown) for _, kind, by, shown in study.linked if by == SUBJECT]
+    occurrences = [(kind, expressions) for _, kind, by, expressions in study.linked if by == SUBJECT]
     rows = []
-    for kind in sorted({kind for kind, _ in said if kind}):
+    for kind in sorted({kind for kind, _ in occurrences if kind}):
         for name in study.totals:
-            cells = Counter((one == kind, name in shown) for one, shown in said)
-            table = np.array([cells[mine, met] for mine in (True, False) for met in (True, False)])
+            cells = Counter((one == kind, name in expressions) for one, expressions in occurrences)
+            table = np.array(
+                [cells[in_category, met] for in_category in (True, False) for met in (True, False)]
+            )
             if table[0]:
-                tables = np.vstack([table, chance.multinomial(len(said), table / len(said), DRAWS)]) + 0.5
+                tables = (
+                    np.vstack([table, chance.multinomial(len(occurrences), table / len(occurrences), DRAWS)])
+                    + 0.5
+                )
                 odds = tables[:, 0] * tables[:, 3] / (tables[:, 1] * tables[:, 2])
                 figures = float(odds[0]), *np.percentile(odds[1:], [2.5, 97.5]).tolist()
                 rows.append((f"{kind}, {name}", kind, name, int(table[:2].sum()), int(table[0]), *figures))
@@ -281,8 +294,8 @@ def categories(study: Study, seed: int = 0) -> Table:
 
 
 def occurrences(study: Study) -> Table:
-    """Table 6.14: shares of all expressions, and of those at emotional words."""
-    met = Counter(name for _, kind, _, shown in study.linked if kind for name in shown)
+    """Return table 6.14: the shares of expressions among all, and among those at emotional words."""
+    met = Counter(name for _, kind, _, expressions in study.linked if kind for name in expressions)
     rows = tuple(
         (name, _percent(total, len(study.every)), _percent(met[name], sum(met.values())))
         for name, total in study.totals.items()
@@ -301,17 +314,17 @@ def _lengths(segments: Sequence[Segment], name: str | None) -> list[int]:
     return [len(segment) for segment in segments if name in (None, segment.text)]
 
 
-def _percent(part: int, whole: int) -> float:
-    return 100.0 * part / whole if whole else 0.0
+def _percent(part: int, total: int) -> float:
+    return 100.0 * part / total if total else 0.0
 
 
 def _fragments(study: Study) -> list[str]:
     return [str(recording.meta.get("fragment") or recording.name) for recording in study.recordings]
 
 
-def _shown(recording: Recording, segments: Sequence[Segment]) -> Any:
-    """Return how many expressions each frame shows."""
-    shown = np.zeros(recording.frames, np.int64)
+def _expressions_per_frame(recording: Recording, segments: Sequence[Segment]) -> Any:
+    """Return the number of expressions in each frame."""
+    count = np.zeros(recording.frames, np.int64)
     for one in segments:
-        shown[one.first : one.last + 1] += 1
-    return shown
+        count[one.first : one.last + 1] += 1
+    return count

@@ -1,4 +1,4 @@
-"""The answers to the tab Label: recordings of a corpus, their films, and the labels that people save."""
+"""The answers to the tab Label: recordings of a corpus, their films, and saving of labels."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Labelling:
     """The tab Label of one page.
 
     Args:
-        settings: of the service; its corpus is that of the tab.
+        settings: of the service, with the corpus.
         may_save: whether this page may change labels.
     """
 
@@ -46,30 +46,30 @@ class Labelling:
         self._folder, self._may_save = settings.corpus, may_save
 
     def answer(self, message: str | bytes) -> str | bytes:
-        """Return the answer to a message: JSON with `id` and `type`.
+        """Return the answer to a message, which is JSON with `id` and `type`.
 
         Returns:
-            JSON, or JSON packed with arrays; {"id", "error"} where something cannot be done, with `conflict`,
-            the present version, where somebody else has changed the labels.
+            JSON, or JSON packed with arrays; {"id", "error"} for errors, with the stored version as
+            `conflict` if somebody else has changed the labels.
         """
         number = None
         try:
-            asked, _ = unpacked(message)
-            number = asked.get("id")
-            kinds = {"list": self._list, "open": self._open, "compare": self._compare, "save": self._save}
-            if asked.get("type") not in kinds:
+            request, _ = unpacked(message)
+            number = request.get("id")
+            handlers = {"list": self._list, "open": self._open, "compare": self._compare, "save": self._save}
+            if request.get("type") not in handlers:
                 raise CorpusError(
-                    f"type: wanted one of {', '.join(kinds)}, got {str(asked.get('type'))[:80]!r}"
+                    f"type: wanted one of {', '.join(handlers)}, got {str(request.get('type'))[:80]!r}"
                 )
-            header, arrays = kinds[asked["type"]](asked)
+            header, arrays = handlers[request["type"]](request)
         except (RealizerError, OSError) as error:
-            words = str(error) if self._folder is None else str(error).replace(f"{self._folder}/", "")
-            return json.dumps({"id": number, "error": words, **getattr(error, "fields", {})})
-        header = {"id": number, "type": asked["type"], **header}
+            text = str(error) if self._folder is None else str(error).replace(f"{self._folder}/", "")
+            return json.dumps({"id": number, "error": text, **getattr(error, "fields", {})})
+        header = {"id": number, "type": request["type"], **header}
         return packed(header, arrays) if arrays else json.dumps(header)
 
     def close(self) -> None:
-        """Nothing is left open."""
+        """Do nothing: there are no resources."""
 
     def _corpus(self) -> Path:
         if self._folder is None:
@@ -78,15 +78,15 @@ class Labelling:
             raise CorpusError(f"{self._folder.name}: wanted a corpus, got no {CORPUS}")
         return self._folder
 
-    def _recording(self, asked: dict[str, Any]) -> Recording:
-        name, folder = str(asked.get("recording", "")), self._corpus()
+    def _recording(self, request: dict[str, Any]) -> Recording:
+        name, folder = str(request.get("recording", "")), self._corpus()
         names = [path.name for path in sorted(folder.iterdir()) if (path / META).is_file()]
         if name not in names:
             raise CorpusError(f"recording: wanted one of {', '.join(names)}, got {name[:80]!r}")
         return read_recording(folder / name)
 
-    def _list(self, asked: dict[str, Any]) -> Any:
-        """Return the recordings with the names of their labels; what cannot be read has an error instead."""
+    def _list(self, request: dict[str, Any]) -> Any:
+        """Return the recordings with the names of their labels; unreadable ones have an error instead."""
         rows: list[dict[str, Any]] = []
         for path in sorted(self._corpus().iterdir()):
             if path.is_dir() and ((path / META).is_file() or (path / LABELS).is_file()):
@@ -98,11 +98,11 @@ class Labelling:
                     rows.append({"name": path.name, "error": str(error).replace(f"{self._folder}/", "")})
         return {"corpus": str(self._folder), "recordings": rows, "editable": self._may_save}, {}
 
-    def _open(self, asked: dict[str, Any]) -> Any:
-        """Return a recording, and its film, or its points (frames, points, 2) where there is no `film`."""
-        found = self._recording(asked)
-        here = (film for film, target in films(self._corpus()).items() if target.name == found.name)
-        film = next(here, None) if asked.get("film", True) else None
+    def _open(self, request: dict[str, Any]) -> Any:
+        """Return a recording with its film or, without `film`, its points (frames, points, 2)."""
+        found = self._recording(request)
+        paths = (film for film, target in films(self._corpus()).items() if target.name == found.name)
+        film = next(paths, None) if request.get("film", True) else None
         header = {
             "recording": found.name,
             "fps": found.fps,
@@ -122,32 +122,32 @@ class Labelling:
         flat = found.points[1][..., :2].astype(np.float32)
         return header | {"points": flat.shape[1]}, {"points": flat}
 
-    def _compare(self, asked: dict[str, Any]) -> Any:
-        """Return the agreement of `annotator`, who has these `labels`, with the annotator `other`."""
-        changed, annotator = self._changed(asked, self._recording(asked))
-        pair = (annotator, str(asked.get("other", "")))
+    def _compare(self, request: dict[str, Any]) -> Any:
+        """Return the agreement of `annotator`, with the message's `labels`, and the annotator `other`."""
+        changed, annotator = self._changed(request, self._recording(request))
+        pair = (annotator, str(request.get("other", "")))
         both = replace(changed, labels=tuple(label for label in changed.labels if label.by in pair))
         rows = agreement([both]).rows if len(both.annotators) == 2 else ()
         return {"agreement": [list(row) for row in rows]}, {}
 
-    def _changed(self, asked: dict[str, Any], found: Recording) -> tuple[Recording, str]:
-        """Return a recording with the labels of a message in place of its annotator's, and the annotator."""
-        annotator = str(asked.get("annotator", "")).strip()
+    def _changed(self, request: dict[str, Any], found: Recording) -> tuple[Recording, str]:
+        """Return a recording with an annotator's labels replaced by those of a message, and the annotator."""
+        annotator = str(request.get("annotator", "")).strip()
         if not annotator or len(annotator) > 64 or not annotator.isprintable():
             raise CorpusError(f"annotator: wanted a name of up to 64 characters, got {annotator[:80]!r}")
         try:
-            added = [(float(start), float(end), str(text)) for start, end, text in asked["labels"]]
+            added = [(float(start), float(end), str(text)) for start, end, text in request["labels"]]
         except (KeyError, TypeError, ValueError):
             raise CorpusError("labels: wanted a list of [start, end, expression]") from None
-        others = replace(found, labels=tuple(label for label in found.labels if label.by != annotator))
-        return change(others, annotator, added), annotator
+        remaining = replace(found, labels=tuple(label for label in found.labels if label.by != annotator))
+        return change(remaining, annotator, added), annotator
 
-    def _save(self, asked: dict[str, Any]) -> Any:
+    def _save(self, request: dict[str, Any]) -> Any:
         if not self._may_save:
             raise CorpusError("your token does not allow to save labels; the draft stays in this browser")
-        found = self._recording(asked)
-        changed, annotator = self._changed(asked, found)
-        if (now := _version(found, annotator)) != asked.get("version"):
+        found = self._recording(request)
+        changed, annotator = self._changed(request, found)
+        if (now := _version(found, annotator)) != request.get("version"):
             raise Conflict(f"{found.name}: the labels of {annotator} were changed since you opened them", now)
         folder = EditFolder(self._corpus() / found.name)
         text = csv_text(COLUMNS[LABELS], map(astuple, changed.labels))
@@ -160,7 +160,7 @@ class Labelling:
 
 
 class Conflict(CorpusError):
-    """Somebody else has changed the labels; `fields` has the version that is there now."""
+    """Somebody else has changed the labels; `fields` has the stored version."""
 
     def __init__(self, text: str, version: str) -> None:
         super().__init__(f"{text}: open the recording again, or save again to replace them")
@@ -169,10 +169,10 @@ class Conflict(CorpusError):
 
 def _rows(recording: Recording, annotator: str) -> list[list[object]]:
     """Return the labels of an annotator as [start, end, expression]."""
-    own: Iterable[Annotation] = (label for label in recording.labels if label.by == annotator)
-    return [[one.start, one.end, one.text] for one in own]
+    labels: Iterable[Annotation] = (label for label in recording.labels if label.by == annotator)
+    return [[one.start, one.end, one.text] for one in labels]
 
 
 def _version(recording: Recording, annotator: str) -> str:
-    """Return the version of one annotator's labels, which does not change when others save theirs."""
+    """Return the version of one annotator's labels, which is independent of other annotators."""
     return version_of(json.dumps(_rows(recording, annotator)).encode())

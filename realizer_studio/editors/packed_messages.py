@@ -1,4 +1,4 @@
-"""Messages of a page and its tools: JSON, or JSON with arrays or bytes behind it."""
+"""Messages between a page and its editors: JSON, or JSON followed by arrays or bytes."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ ALIGN = 8  # bytes; arrays begin at a multiple of it
 def packed(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
     """Return JSON and arrays as one message: the length of the JSON (u32), the JSON, and the arrays.
 
-    `arrays` of the JSON has the name, the type as numpy's and the offset from the message's start of each.
+    `arrays` in the JSON has for each name the numpy type, the size and the offset from the message's start.
     """
     rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    listed = {name: [array.dtype.str[1:], array.size, 0] for name, array in rows.items()}
-    room = len(json.dumps({**header, "arrays": listed})) + 12 * len(rows) + 4
-    at = -(-room // ALIGN) * ALIGN
+    index = {name: [array.dtype.str[1:], array.size, 0] for name, array in rows.items()}
+    size = len(json.dumps({**header, "arrays": index})) + 12 * len(rows) + 4
+    at = -(-size // ALIGN) * ALIGN
     start = at
     for name, array in rows.items():
-        listed[name][2] = at
+        index[name][2] = at
         at += -(-array.nbytes // ALIGN) * ALIGN
-    text = json.dumps({**header, "arrays": listed}).ljust(start - 4).encode()
+    text = json.dumps({**header, "arrays": index}).ljust(start - 4).encode()
     parts: list[bytes | memoryview] = [len(text).to_bytes(4, "little"), text]
     for array in rows.values():
         parts += array.reshape(-1).view(np.uint8).data, bytes(-array.nbytes % ALIGN)
@@ -35,19 +35,19 @@ def packed(header: Mapping[str, Any], arrays: Mapping[str, Any]) -> bytes:
 
 
 def unpacked(message: str | bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON of a message of the page, and the bytes behind it.
+    """Return the JSON of a message, and the bytes after it.
 
     Raises:
-        RealizerError: it is no such message.
+        RealizerError: the message is invalid.
     """
     try:
         if isinstance(message, str):
-            asked, payload = json.loads(message), b""
+            header, payload = json.loads(message), b""
         else:
             (length,) = struct.unpack_from("<I", message)
-            asked, payload = json.loads(message[4 : 4 + length]), message[4 + length :]
+            header, payload = json.loads(message[4 : 4 + length]), message[4 + length :]
     except (ValueError, struct.error) as error:
         raise RealizerError(f"wanted JSON, or a length, JSON and bytes: {error}") from None
-    if not isinstance(asked, dict):
-        raise RealizerError(f"wanted a JSON object, got {str(asked)[:80]!r}")
-    return asked, payload
+    if not isinstance(header, dict):
+        raise RealizerError(f"wanted a JSON object, got {str(header)[:80]!r}")
+    return header, payload

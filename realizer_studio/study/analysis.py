@@ -1,4 +1,4 @@
-"""Tables of a study: Wojdel 2005, 5.1; Paul 2010, 4.4 and 4.5; confusion, the wheel, films, agreement."""
+"""Tables of a study's results: Wojdel 2005, 5.1; Paul 2010, 4.4 and 4.5; and others."""
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
@@ -11,14 +11,21 @@ from realizer_studio.corpus.agreement import alpha
 from realizer_studio.corpus.statistics import Table
 from realizer_studio.study.answers import Answer, attention, inattentive
 from realizer_studio.study.items import EMOTIONS, NAMES, SCORES
-from realizer_studio.study.measures import against_chance, circular_mean, hit_rates, interval, ratio, turn
+from realizer_studio.study.measures import (
+    against_chance,
+    angle_difference,
+    circular_mean,
+    hit_rates,
+    interval,
+    ratio,
+)
 
 MATCHED = ("right", "removed", "added", "none")
 BEST = 3.0  # score
-FEWEST = 5  # judges over whom intervals are taken; of fewer, they are taken over items
-# Figures of the publications, to compare with.
+FEWEST = 5  # least number of judges for intervals over judges; otherwise intervals are over items
+# Numbers of the publications, for comparison.
 WOJDEL = {"visual": (0.698, 0.140, 0.159, 0.003), "emotional": (0.640, 0.140, 0.207, 0.013)}
-PAUL = {  # implemented, scored 3, 2, 1, 0; weighted means without and with what is not implemented
+PAUL = {  # implemented, scored 3, 2, 1, 0; weighted means without and with unimplemented ones
     "FaceEditor": (104, 91, 13, 0, 0, 2.88, 2.60),
     "Xface": (70, 19, 30, 21, 0, 1.97, 1.32),
     "Greta": (110, 71, 25, 14, 0, 2.55, 2.32),
@@ -29,16 +36,16 @@ Value = Callable[[Answer], Any]
 
 
 def groups(answers: Sequence[Answer], *kinds: str) -> Iterator[tuple[tuple[str, str, str], list[Answer]]]:
-    """Yield (who, variant, kind) with the answers, in order, without attention items."""
+    """Yield (group, variant, kind) with the answers, in order, without attention items."""
     found: dict[tuple[str, str, str], list[Answer]] = {}
     for one in answers:
         if one.kind in kinds and "check" not in one.truth:
-            found.setdefault((one.who, one.truth["variant"], one.kind), []).append(one)
+            found.setdefault((one.group, one.truth["variant"], one.kind), []).append(one)
     yield from sorted(found.items())
 
 
 def units(answers: Sequence[Answer], value: Value) -> Float64:
-    """Return the sums (n, ...) of values over the answers of each judge, or item if judges are few."""
+    """Return the sums (n, ...) of values over the answers of each judge, or of each item for few judges."""
     pick = "judge" if len({one.judge for one in answers}) >= FEWEST else "item"
     sums: dict[str, Any] = {}
     for one in answers:
@@ -56,7 +63,7 @@ def mean(
 
 
 def matching(answers: Sequence[Answer]) -> Table:
-    """Table 5.1 of Wojdel 2005, with chi-square of the three faces against a third each."""
+    """Return table 5.1 of Wojdel 2005, with chi-square of the three faces against equal shares."""
     rows: list[tuple[Any, ...]] = []
     for group, some in groups(answers, "visual", "emotional"):
         counts = np.array([sum(one.role == role for one in some) for role in MATCHED], np.float64)
@@ -76,28 +83,28 @@ def _scores(some: Sequence[Answer]) -> dict[str, list[Answer]]:
 
 
 def implemented(answers: Sequence[Answer]) -> Table:
-    """Table 4.4 of Paul 2010: displacements by score, the lower median of judges."""
+    """Return table 4.4 of Paul 2010: displacements by score, which is the lower median over judges."""
     rows: list[tuple[Any, ...]] = []
-    for (who, variant, _), some in groups(answers, "displacements"):
+    for (group_name, variant, _), some in groups(answers, "displacements"):
         medians = [
             sorted(one.role for one in every)[(len(every) - 1) // 2]
             for every in _scores(some).values()
             if every[0].truth["moves"]
         ]
-        rows.append((who, variant, len(_scores(some)), len(medians), *map(medians.count, SCORES)))
+        rows.append((group_name, variant, len(_scores(some)), len(medians), *map(medians.count, SCORES)))
     rows += [("Paul 2010", name, 127, *figures[:5]) for name, figures in PAUL.items()]
     columns = "who", "variant", "displacements", "implemented", *(f"score {score}" for score in SCORES)
     return Table("4.4", "Displacements of single FAPs by score", columns, tuple(rows))
 
 
 def scores(answers: Sequence[Answer]) -> Table:
-    """Table 4.5 of Paul 2010: weighted means without and with displacements that are not implemented (0)."""
+    """Return table 4.5 of Paul 2010: weighted means without and with unimplemented displacements (0)."""
     rows: list[tuple[Any, ...]] = []
-    for (who, variant, _), some in groups(answers, "displacements"):
+    for (group_name, variant, _), some in groups(answers, "displacements"):
         cells: tuple[Any, ...] = ()
         for chosen in ([one for one in some if one.truth["moves"]], some):
             cells += mean(chosen, _score, _weight, BEST) if chosen else (None,) * 3
-        rows.append((who, variant, *cells))
+        rows.append((group_name, variant, *cells))
     rows += [("Paul 2010", name, f[5], None, None, f[6], None, None) for name, f in PAUL.items()]
     columns = "who", "variant", "without unimplemented", *ENDS, "with unimplemented", "with from", "with to"
     return Table("4.5", "Weighted mean score of displacements", columns, tuple(rows))
@@ -112,24 +119,24 @@ def _weight(one: Answer) -> float:
 
 
 def displacements(answers: Sequence[Answer]) -> Table:
-    """Mean score of each displacement, the worst first."""
+    """Return the mean score of each displacement, the worst first."""
     rows = []
-    for (who, variant, _), some in groups(answers, "displacements"):
+    for (group_name, variant, _), some in groups(answers, "displacements"):
         for every in _scores(some).values():
             truth = every[0].truth
             found = truth["fap"], truth["name"], truth["sign"], truth["weight"], truth["moves"]
             rows.append(
-                (who, variant, *found, len(every), float(np.mean([float(one.role) for one in every])))
+                (group_name, variant, *found, len(every), float(np.mean([float(one.role) for one in every])))
             )
     columns = "who", "variant", "fap", "name", "sign", "weight", "moves", "answers", "score"
     return Table("displacements", "Scores by FAP", columns, tuple(sorted(rows, key=lambda row: row[-1])))
 
 
 def _naming(answers: Sequence[Answer]) -> Iterator[tuple[tuple[str, str, str], list[Answer]]]:
-    """Yield (who, variant, profiles) with the answers."""
-    for (who, variant, _), some in groups(answers, "naming"):
+    """Yield (group, variant, profiles) with the answers."""
+    for (group_name, variant, _), some in groups(answers, "naming"):
         for profiles in sorted({one.truth["profiles"] for one in some}):
-            yield (who, variant, profiles), [one for one in some if one.truth["profiles"] == profiles]
+            yield (group_name, variant, profiles), [one for one in some if one.truth["profiles"] == profiles]
 
 
 def _cell(one: Answer) -> Float64:
@@ -139,19 +146,19 @@ def _cell(one: Answer) -> Float64:
 
 
 def confusion(answers: Sequence[Answer]) -> Table:
-    """Which names were given to which emotion, with hit rates and unbiased hit rates (Wagner 1993)."""
+    """Return the counts of names for each emotion, with hit rates and unbiased hit rates (Wagner 1993)."""
     rows: list[tuple[Any, ...]] = []
     for group, some in _naming(answers):
         parts = units(some, _cell)
-        whole = parts.sum(axis=0)
-        rates = hit_rates(whole)
+        total = parts.sum(axis=0)
+        rates = hit_rates(total)
         for k, name in enumerate(EMOTIONS):
-            if shown := whole[k].sum():
+            if count := total[k].sum():
                 ends = interval(parts, lambda sums, k=k: hit_rates(sums)[:, k])  # type: ignore[misc]
-                rows.append((*group, name, *whole[k].astype(int), whole[k, k] / shown, rates[k], *ends))
+                rows.append((*group, name, *total[k].astype(int), total[k, k] / count, rates[k], *ends))
         ends = interval(parts, lambda sums: np.nanmean(hit_rates(sums), axis=1))
-        share = np.trace(whole[:, : len(EMOTIONS)]) / whole.sum()
-        given = whole.sum(axis=0).astype(int)
+        share = np.trace(total[:, : len(EMOTIONS)]) / total.sum()
+        given = total.sum(axis=0).astype(int)
         rows.append((*group, "all", *given, share, float(np.nanmean(rates)), *ends))
     columns = "who", "variant", "profiles", "emotion", *NAMES, "hit rate", "unbiased", *ENDS
     return Table(
@@ -160,26 +167,32 @@ def confusion(answers: Sequence[Answer]) -> Table:
 
 
 def wheel(answers: Sequence[Answer]) -> Table:
-    """Where emotions were placed on the wheel: mean error with its direction, and mean size of errors."""
+    """Return the errors on the wheel of emotions: mean error with its direction, and mean absolute error."""
     rows = []
     for group, every in _naming(answers):
         for name in (*EMOTIONS, None):
             some = [a for a in every if a.angle is not None and name in (a.truth["emotion"], None)]
             if some:
-                sizes = mean(some, lambda one: abs(_off(one)), most=180.0)
+                sizes = mean(some, lambda one: abs(_angle_error(one)), most=180.0)
                 rows.append(
-                    (*group, name or "all", len(some), *circular_mean(np.array([*map(_off, some)])), *sizes)
+                    (
+                        *group,
+                        name or "all",
+                        len(some),
+                        *circular_mean(np.array([*map(_angle_error, some)])),
+                        *sizes,
+                    )
                 )
     columns = "who", "variant", "profiles", "emotion", "answers", "error", "agreement", "size of error", *ENDS
     return Table("wheel", "Errors on the wheel in degrees", columns, tuple(rows))
 
 
-def _off(one: Answer) -> float:
-    return turn(one.angle or 0.0, one.truth["angle"])
+def _angle_error(one: Answer) -> float:
+    return angle_difference(one.angle or 0.0, one.truth["angle"])
 
 
 def films(answers: Sequence[Answer]) -> Table:
-    """Which of two films was preferred; half of the answers without a difference count for each."""
+    """Return preferences between pairs of films; an answer without preference counts half for each."""
     rows = []
     for group, every in groups(answers, "films"):
         for pair in sorted({tuple(one.truth["pair"]) for one in every}):
@@ -195,11 +208,11 @@ def films(answers: Sequence[Answer]) -> Table:
 
 
 def comparisons(answers: Sequence[Answer]) -> Table:
-    """Differences between variants of the means of what was asked: right answers, or scores."""
+    """Return the differences between variants in the share of right answers, or in the mean score."""
     rows = []
     every = list(groups(answers, "visual", "emotional", "naming", "displacements"))
-    for ((who, a, kind), one), ((other, b, same), two) in combinations(every, 2):
-        if (who, kind) != (other, same):
+    for ((group_name, a, kind), one), ((other, b, same), two) in combinations(every, 2):
+        if (group_name, kind) != (other, same):
             continue
         scored = kind == "displacements"
 
@@ -213,15 +226,15 @@ def comparisons(answers: Sequence[Answer]) -> Table:
         parts = units([*one, *two], part)
         most = BEST if scored else 1.0
         ends = interval(parts, lambda sums: ratio(sums) @ (1.0, -1.0), (-most, most))
-        rows.append((who, kind, a, b, float(ratio(parts.sum(axis=0)) @ (1.0, -1.0)), *ends))
+        rows.append((group_name, kind, a, b, float(ratio(parts.sum(axis=0)) @ (1.0, -1.0)), *ends))
     columns = "who", "question", "one", "other", "difference", *ENDS
     return Table("comparisons", "Differences between variants", columns, tuple(rows))
 
 
 def agreement(answers: Sequence[Answer]) -> Table:
-    """Krippendorff's alpha of judges: of names, and of scores as numbers."""
+    """Return Krippendorff's alpha of judges for each kind of question."""
     rows = []
-    for (who, variant, kind), some in groups(
+    for (group_name, variant, kind), some in groups(
         answers, "visual", "emotional", "naming", "displacements", "films"
     ):
         judges, items, roles = (sorted({pick(one) for one in some}) for pick in PICKS)
@@ -229,7 +242,7 @@ def agreement(answers: Sequence[Answer]) -> Table:
         for one in some:
             code = float(one.role) if kind == "displacements" else roles.index(one.role)
             codes[judges.index(one.judge), items.index(one.item)] = code
-        rows.append((who, variant, kind, len(judges), alpha(codes, numbers=kind == "displacements")))
+        rows.append((group_name, variant, kind, len(judges), alpha(codes, numbers=kind == "displacements")))
     columns = "who", "variant", "question", "judges", "alpha"
     return Table("agreement", "Krippendorff's alpha", columns, tuple(rows))
 
@@ -241,11 +254,19 @@ def judges(answers: Sequence[Answer]) -> Table:
     """Return the number, speed and attention of the answers of each judge."""
     rows = []
     failed = inattentive(answers)
-    for (who, judge), (right, every) in attention(answers).items():
-        mine = [one for one in answers if (one.who, one.judge) == (who, judge)]
-        seconds = float(np.median([one.seconds for one in mine]))
+    for (group_name, judge), (right, every) in attention(answers).items():
+        own_answers = [one for one in answers if (one.group, one.judge) == (group_name, judge)]
+        seconds = float(np.median([one.seconds for one in own_answers]))
         rows.append(
-            (who, judge, len(mine), seconds, right, every, "failed" if (who, judge) in failed else "")
+            (
+                group_name,
+                judge,
+                len(own_answers),
+                seconds,
+                right,
+                every,
+                "failed" if (group_name, judge) in failed else "",
+            )
         )
     columns = "who", "judge", "answers", "median seconds", "attention right", "of", "attention"
     return Table("judges", "Judges", columns, tuple(sorted(rows)))
@@ -255,11 +276,11 @@ TABLES = (matching, implemented, scores, confusion, wheel, films, comparisons, a
 
 
 def tables(answers: Sequence[Answer], keep: bool = False) -> list[Table]:
-    """Return all tables that have answers; `keep`: those who failed attention items count too."""
+    """Return all tables that have answers; `keep` includes judges who failed attention items."""
     failed = () if keep else inattentive(answers)
-    counted = [one for one in answers if (one.who, one.judge) not in failed]
-    asked = {one.kind for one in counted}
+    counted = [one for one in answers if (one.group, one.judge) not in failed]
+    kinds = {one.kind for one in counted}
     found = [make(counted) for make in TABLES]
     published = {"5.1": {"visual", "emotional"}, "4.4": {"displacements"}, "4.5": {"displacements"}}
-    shown = [one for one in found if one.rows and published.get(one.name, asked) & asked]
-    return [*shown, judges(answers)]
+    relevant = [one for one in found if one.rows and published.get(one.name, kinds) & kinds]
+    return [*relevant, judges(answers)]

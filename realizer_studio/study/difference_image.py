@@ -7,19 +7,19 @@ import numpy as np
 from realizer.core.array_types import Float32, UInt8
 
 PAPER = np.array([24, 26, 29], np.float32)
-# Below the differences is the neutral face, blurred, without its background, at 25 % (Paul 2010, 4.4.2).
+# The background is the neutral face, blurred, at 25 % opacity (Paul 2010, 4.4.2).
 STRENGTH = 0.25
 BLUR = 0.012  # of the picture's height
-MAX_DIFFERENCE = 0.25  # has the last colour; 1 is the difference between black and white
+MAX_DIFFERENCE = 0.25  # of the last colour; 1 is the difference between black and white
 MIN_DIFFERENCE = 0.012  # three steps of 255; smaller differences are invisible
-# Colours (sRGB) of increasing differences. They become lighter, so that the scale is clear without hues.
+# Colours (sRGB) of increasing differences, which become lighter, so that the scale does not depend on hues.
 COLOURS = np.array([[78, 28, 128], [196, 40, 104], [246, 128, 48], [255, 238, 170]], np.float32)
 
 
 def ramp(amount: Float32) -> Float32:
     """Return the colours (..., 3), sRGB 0..255, of differences in units of `MAX_DIFFERENCE`, 0..1."""
-    places = np.linspace(0, 1, len(COLOURS))
-    return np.stack([np.interp(amount, places, COLOURS[:, k]) for k in range(3)], axis=-1).astype(np.float32)
+    stops = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(amount, stops, COLOURS[:, k]) for k in range(3)], axis=-1).astype(np.float32)
 
 
 def faint(neutral: UInt8) -> Float32:

@@ -1,4 +1,4 @@
-"""Pictures for studies: small, without metadata, and of every variant that is compared."""
+"""A drawer of small pictures without metadata, for studies."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from realizer_studio.study.difference_image import flatten
 SIZE = 240, 300  # pixels
 FRONT = "close"
 LARGEST = 480  # pixels; longer sides of photographs are reduced to this
-VISIBLE, AREA = 20, 0.004  # a difference is seen if a channel differs by 20 of 255 in 0.4 % of the pixels
+VISIBLE, AREA = 20, 0.004  # a visible difference: a channel differs by 20 of 255 in 0.4 % of the pixels
 Units = Mapping[tuple[int, str], float]  # (AU, side LEFT | RIGHT | BOTH) -> intensity 0..1
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One of the ways to draw faces that a study compares."""
+    """A face, deformer and mapping that a study compares with others."""
 
     face: str  # name or path
     deformer: str | None = None  # "mpeg4", "au" or None
@@ -44,7 +44,7 @@ class Variant:
 
 @dataclass
 class Drawer:
-    """Draws rows of the animation axis; a context manager that ends the renderers."""
+    """A renderer of rows of the animation axis; a context manager, which closes the renderers."""
 
     step: Callable[[int], object] = lambda count: None  # called with 1 after each picture
     _open: dict[tuple[Variant, str], Renderer] = field(default_factory=dict)
@@ -82,12 +82,12 @@ def row(units: Units | None = None, faps: Mapping[int, float] | None = None) -> 
 
 
 def opaque(picture: UInt8) -> UInt8:
-    """Return a picture (h, w, 4) over the plain colour of the light, (h, w, 3)."""
+    """Return a picture (h, w, 4) over the backdrop's colour, (h, w, 3)."""
     return flatten(picture, np.rint(np.array(preset(None).backdrop_middle) * 255))
 
 
 def differs(one: UInt8, other: UInt8) -> bool:
-    """Return whether people can see the difference of two pictures (h, w, 4)."""
+    """Return whether two pictures (h, w, 4) differ visibly."""
     apart = np.abs(opaque(one).astype(np.int16) - opaque(other)).max(axis=2)
     return bool((apart >= VISIBLE).mean() >= AREA)
 

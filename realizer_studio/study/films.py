@@ -1,4 +1,4 @@
-"""Pairs of films: with and without rules about expressions, and with random ones, the control."""
+"""Pairs of films: with expressions by rules, with random expressions, and without expressions."""
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
@@ -26,18 +26,18 @@ DOCUMENT = (
 
 
 def control(text: str, expressions: int, draws: np.random.Generator) -> str:
-    """Return BML that speaks a text with as many expressions, each any template at any word."""
+    """Return BML that speaks a text with a number of random templates at random words."""
     words = text.split()
-    places = draws.integers(len(words), size=expressions).tolist()
-    spoken = " ".join(
-        f'<sync id="r{k}"/>{escape(word)}' if k in places else escape(word) for k, word in enumerate(words)
+    positions = draws.integers(len(words), size=expressions).tolist()
+    speech = " ".join(
+        f'<sync id="r{k}"/>{escape(word)}' if k in positions else escape(word) for k, word in enumerate(words)
     )
     names = [str(name).lower() for name in draws.choice(list(templates()), expressions)]
-    shown = [
-        f'{TAG} id="e{k}" name="{PREFIX}{name}" intensity="{INTENSITY}" start="speech1:r{place}"/>'
-        for k, (name, place) in enumerate(zip(names, places, strict=True))
+    expressions_ = [
+        f'{TAG} id="e{k}" name="{PREFIX}{name}" intensity="{INTENSITY}" start="speech1:r{position}"/>'
+        for k, (name, position) in enumerate(zip(names, positions, strict=True))
     ]
-    return DOCUMENT.format(spoken, "".join(shown))
+    return DOCUMENT.format(speech, "".join(expressions_))
 
 
 def films(
@@ -49,7 +49,10 @@ def films(
 ) -> Iterator[Item]:
     """Yield pairs of films of each text: enriched, plain and random ones, and with and without co-occurrence.
 
-    Two films that show the same are no pair. Raises RealizerError without PyAV.
+    Pairs of equal films are omitted.
+
+    Raises:
+        RealizerError: PyAV is not installed.
     """
     for variant in variants:
         play = partial(
@@ -75,14 +78,14 @@ def films(
                     encoded[name] = _film(played[name])
                     step(1)
                 truth = {"variant": variant.name, "text": text, "pair": list(pair)}
-                shown = {name: padded(encoded[name], draws) for name in pair}
-                yield Item("films", truth, {}, shown, {"text": text})
+                options = {name: padded(encoded[name], draws) for name in pair}
+                yield Item("films", truth, {}, options, {"text": text})
 
 
 def padded(film: bytes, draws: np.random.Generator) -> bytes:
-    """Return a WebM file with a Void element of random length, so that no two files of one film are the same.
+    """Return a WebM file with a Void element of random length, so that copies of a film are different files.
 
-    Otherwise the film that is in most pairs would be known as the enriched one.
+    Otherwise the enriched film could be recognised, because it is in most pairs.
     """
     size = int(draws.integers(1000, 16000))
     return film + b"\xec" + (0x4000 | size).to_bytes(2, "big") + draws.bytes(size)

@@ -1,4 +1,4 @@
-"""A machine that judges a study from its pictures alone, by the networks of the tracking."""
+"""A machine judge, which answers a study from its pictures, by the networks of the tracking."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping
@@ -20,11 +20,11 @@ from realizer_studio.tracking.pictures import Picture, read_picture
 from realizer_studio.tracking.regressor import Components, Measured, components, measure
 
 NAME = "tracking"
-NEAR = 1.0  # distance of action units at which two faces are too different
+NEAR = 1.0  # largest distance of action units between two faces that match
 
 
 def read_items(folder: Path) -> dict[str, Any]:
-    """Return the items of a study's folder; raises TableError if it is none."""
+    """Return the items in a study's folder; raises TableError if the folder is no study."""
     try:
         content = (folder / ITEMS).read_text("utf-8")
         return dict(json.loads(content.partition("=")[2].rstrip().removesuffix(";")))
@@ -33,41 +33,47 @@ def read_items(folder: Path) -> dict[str, Any]:
 
 
 def judge(folder: Path, step: Callable[[int], object]) -> Iterator[list[str]]:
-    """Yield the rows of answers, with the columns `COLUMNS`, of a machine that sees the pictures only.
+    """Yield rows of answers, with the columns `COLUMNS`, by a machine that reads only the pictures.
 
-    It chooses the face with the most similar action units, or, by emotion, with the most similar beliefs
-    about emotions; and it names faces. It leaves out scores and films, and faces that it does not find.
+    It chooses the face with the most similar action units or, for emotions, the most similar beliefs, and it
+    names faces. It skips scores and films, and pictures in which no face is found.
 
     Raises:
-        TableError: no study. TrackingError: a picture cannot be read. RealizerError: no ai-edge-litert.
+        TableError: the folder is no study.
+        TrackingError: a picture cannot be read.
+        RealizerError: ai-edge-litert is not installed.
     """
     study = read_items(folder)
-    eyes = _Eyes(folder)
+    vision = _Vision(folder)
     for item in study["items"]:
         step(1)
-        found = eyes.answer(item)
+        found = vision.answer(item)
         if found is not None:
             answer, angle = (item["check"], "") if "check" in item else found
-            known = {"study": study["study"], "judge": NAME, "by": "machine", "item": item["id"]}
-            known |= {"kind": item["kind"], "answer": answer, "angle": angle}
-            yield [known.get(name, "") for name in COLUMNS]
+            columns = {"study": study["study"], "judge": NAME, "by": "machine", "item": item["id"]}
+            columns |= {"kind": item["kind"], "answer": answer, "angle": angle}
+            yield [columns.get(name, "") for name in COLUMNS]
 
 
-class _Eyes:
-    """What the machine sees in the pictures of a folder."""
+class _Vision:
+    """The faces in the pictures of a folder, tracked on demand."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._seen = cache(self._look)
+        self._components = cache(self._track)
 
     def answer(self, item: Mapping[str, Any]) -> tuple[str, str] | None:
         """Return an answer and an angle on the wheel, or None."""
-        kind, shown = item["kind"], item["shown"]
+        kind, pictures = item["kind"], item["shown"]
         if kind not in ("visual", "emotional", "naming"):
             return None
-        pairs = [(shown["face"], "")] if kind == "naming" else [(shown["reference"], shown.get("rest", ""))]
+        pairs = (
+            [(pictures["face"], "")]
+            if kind == "naming"
+            else [(pictures["reference"], pictures.get("rest", ""))]
+        )
         faces = [
-            self._measured(*pair) for pair in [*pairs, *((o, shown["neutral"]) for o in item["options"])]
+            self._measured(*pair) for pair in [*pairs, *((o, pictures["neutral"]) for o in item["options"])]
         ]
         found = [face for face in faces if face is not None]
         if len(found) < len(faces):
@@ -79,14 +85,14 @@ class _Eyes:
             values = [recogniser().beliefs(face.faps, mask())[0] for face in found]
         else:
             values = [face.units[0] for face in found]
-        apart = np.linalg.norm(np.stack(values[1:]) - values[0], axis=1)
-        too_far = kind == "visual" and apart.min() > NEAR
-        return "none" if too_far else str(item["options"][int(np.argmin(apart))]), ""
+        distance = np.linalg.norm(np.stack(values[1:]) - values[0], axis=1)
+        too_far = kind == "visual" and distance.min() > NEAR
+        return "none" if too_far else str(item["options"][int(np.argmin(distance))]), ""
 
     def _measured(self, file: str, rest: str) -> Measured | None:
-        seen, neutral = self._seen(file), self._seen(rest) if rest else None
-        return None if seen is None else measure(seen, neutral.values[0] if neutral else None)
+        face, neutral = self._components(file), self._components(rest) if rest else None
+        return None if face is None else measure(face, neutral.values[0] if neutral else None)
 
-    def _look(self, file: str) -> Components | None:
+    def _track(self, file: str) -> Components | None:
         people = follow([Picture(0.0, read_picture(self._folder / file), file)])[1]
         return components(people[0].faces) if people else None

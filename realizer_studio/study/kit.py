@@ -1,4 +1,4 @@
-"""The folder of a study, which any browser opens, and the key to its right answers, which lies outside it."""
+"""A writer of a study's folder, which a browser opens, and of the key to its answers beside it."""
 
 import hashlib
 import json
@@ -16,23 +16,23 @@ from realizer.core.atomic_files import write_text
 from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item
 
 ITEMS, TEXTS, PAGE = "items.js", "texts.js", "index.html"
-SAVED = 1_000_000_000  # time of all files, in seconds, so that it does not tell in what order they were made
+SAVED = 1_000_000_000  # modification time of all files, in seconds, which hides their order
 
 
 def key_of(folder: Path) -> Path:
-    """Return the file beside a study's folder that holds its right answers."""
+    """Return the path of the key, which is beside a study's folder."""
     folder = folder.resolve()
     return folder.with_name(f"{folder.name}.key.json")
 
 
 def texts() -> dict[str, Any]:
-    """Return language -> texts of the page."""
+    """Return the page's texts by language."""
     content = files(__package__).joinpath("texts.json").read_text("utf-8")
     return dict(json.loads(content))
 
 
 def check_folder(folder: Path) -> None:
-    """Raise ValueError unless a study can be written there without replacing anything."""
+    """Raise ValueError if a study cannot be written to a folder without replacing files."""
     parent = folder.resolve().parent
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise ValueError(f"{folder}: wanted a new or empty folder, got one with files in it")
@@ -43,13 +43,13 @@ def check_folder(folder: Path) -> None:
 
 
 def write_kit(folder: Path, items: Sequence[Item], about: Mapping[str, Any]) -> Path:
-    """Write the folder of a study and its key, or nothing; return the key's path.
+    """Write the folder of a study and its key, and return the key's path; an error leaves no files.
 
-    Names of files and items are hashes with a random salt, and items lie in the order of their names, so that
-    the folder does not tell right answers.
+    Names of files and items are hashes with a random salt, and items are ordered by name, so that the folder
+    does not reveal answers.
 
     Args:
-        about: `judges`, `language`, and what else the key should tell.
+        about: `judges`, `language`, and further facts for the key.
 
     Raises:
         ValueError: as `check_folder`.
@@ -59,19 +59,19 @@ def write_kit(folder: Path, items: Sequence[Item], about: Mapping[str, Any]) -> 
     salt = secrets.token_hex(16)
     study = {"study": _name(salt, "study"), "judges": about["judges"], "language": about["language"]}
     with _new_folder(folder) as draft:
-        shown, truths = [], {}
+        public, truths = [], {}
         for number, item in enumerate(items):
             name = _name(salt, str(number))
             pictures = {role: _save(draft, salt, content) for role, content in item.shown.items()}
             options = {
                 _save(draft, f"{salt}{number}", content): role for role, content in item.options.items()
             }
-            one = {"id": name, "kind": item.kind, "shown": pictures, "options": sorted(options)}
-            shown.append(one | {"text": dict(item.text)} | ({"check": item.check} if item.check else {}))
+            entry = {"id": name, "kind": item.kind, "shown": pictures, "options": sorted(options)}
+            public.append(entry | {"text": dict(item.text)} | ({"check": item.check} if item.check else {}))
             truths[name] = {"kind": item.kind, **item.truth, "shown": pictures, "options": options}
         kinds = [kind for kind in KINDS if any(item.kind == kind for item in items)]
         content = study | {"kinds": kinds, "answers": ANSWERS, "wheel": WHEEL}
-        content |= {"items": sorted(shown, key=lambda one: str(one["id"]))}
+        content |= {"items": sorted(public, key=lambda entry: str(entry["id"]))}
         _script(draft / ITEMS, "STUDY", content)
         _script(draft / TEXTS, "TEXTS", texts())
         page, script = (files(__package__).joinpath(name).read_text("utf-8") for name in (PAGE, "page.js"))
@@ -95,14 +95,14 @@ def _save(folder: Path, salt: str, content: bytes) -> str:
 
 
 def _script(path: Path, name: str, content: Any) -> None:
-    """Write JSON as a script: a page that is opened as a file may not fetch others."""
+    """Write JSON as a script, because a page that is opened as a file cannot fetch other files."""
     text = json.dumps(content, ensure_ascii=False, indent=1)
     path.write_text(f"window.{name} = {text};\n", "utf-8")
 
 
 @contextmanager
 def _new_folder(folder: Path) -> Iterator[Path]:
-    """Yield a folder that gets its name at the end of the block, or is deleted, and the key, if it fails."""
+    """Yield a temporary folder, which is renamed at the end; on errors it and the key are deleted."""
     draft = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.resolve().parent))
     try:
         yield draft

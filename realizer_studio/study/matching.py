@@ -1,4 +1,4 @@
-"""Visual and emotional matching: a reference, and three faces of which one is right (Wojdel 2005, 5.3.2)."""
+"""Questions of visual and emotional matching: a reference and three faces (Wojdel 2005, 5.3.2)."""
 
 import csv
 import re
@@ -21,12 +21,12 @@ from realizer_studio.study.items import EMOTIONS, Item
 LABELS = "labels.csv"  # in a folder of photographs: file, aus
 FACE = "face.toml"  # in a face folder
 UNIT = re.compile(r"(\d+[LR]?)(?::([\d.]+))?")
-# Units that a still picture from the front shows.
+# Units that are visible in a still picture from the front.
 ADDED = (1, 2, 4, 5, 6, 7, 9, 10, 12, 14, 15, 16, 17, 18, 20, 22, 23, 24, 25, 26, 27, 43)
 LEAST_ADDED = 0.5
-MOST = 8  # additions that are drawn to see whether they can be seen
-TRIPLES = 2  # of a reference
-HEAD, TURNED = (48, 49, 50), 6000  # FAPs of the head, and 3.4 degrees
+MOST = 8  # additions that are drawn to test their visibility
+TRIPLES = 2  # for each reference
+HEAD, TURNED = (48, 49, 50), 6000  # FAPs of the head, and their largest random value (3.4 degrees)
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Reference:
 
 
 def references(source: str, draw: Drawer) -> list[Reference]:
-    """Return the photographs of a folder, or our twelve templates and six emotions on a face.
+    """Return the photographs of a folder, or the twelve templates and six emotions on a face.
 
     Args:
         source: a face, or a folder with photographs and labels.csv: `file,aus`, such as
@@ -52,10 +52,12 @@ def references(source: str, draw: Drawer) -> list[Reference]:
     """
     if Path(source).is_dir() and not (Path(source) / FACE).exists():
         return _photographs(Path(source))
-    shown = {name.lower(): found.aus for name, found in templates().items()}
-    shown |= {f"basic {name}": face_lexemes()[name.upper()].aus for name in EMOTIONS}
-    rest, *drawn = map(webp, draw(Variant(source), [row(), *map(row, shown.values())]))
-    return [Reference(*named, picture, rest) for named, picture in zip(shown.items(), drawn, strict=True)]
+    expressions = {name.lower(): found.aus for name, found in templates().items()}
+    expressions |= {f"basic {name}": face_lexemes()[name.upper()].aus for name in EMOTIONS}
+    rest, *drawn = map(webp, draw(Variant(source), [row(), *map(row, expressions.values())]))
+    return [
+        Reference(*named, picture, rest) for named, picture in zip(expressions.items(), drawn, strict=True)
+    ]
 
 
 def _photographs(source: Path) -> list[Reference]:
@@ -68,16 +70,16 @@ def _photographs(source: Path) -> list[Reference]:
     found: list[Reference] = []
     rest = None
     for number, line in enumerate(lines, 2):
-        place = f"{source / LABELS}, line {number}"
+        location = f"{source / LABELS}, line {number}"
         if not line.get("file") or line.get("aus") is None:
-            raise TableError(f"{place}: wanted the columns file,aus; got {line}")
+            raise TableError(f"{location}: wanted the columns file,aus; got {line}")
         parts = [UNIT.fullmatch(part.strip()) for part in line["aus"].split("+") if part.strip()]
         if None in parts:
-            raise TableError(f"{place}, aus: wanted units such as 1+2+5:0.6, got {line['aus']!r}")
+            raise TableError(f"{location}, aus: wanted units such as 1+2+5:0.6, got {line['aus']!r}")
         cells = {part[1]: float(part[2] or 1) for part in parts if part}
         picture = webp(np.asarray(read_picture(source / line["file"])))
         if cells:
-            found.append(Reference(line["file"], read_aus(cells, place), picture, None))
+            found.append(Reference(line["file"], read_aus(cells, location), picture, None))
         else:
             rest = picture
     if not found:
@@ -88,26 +90,28 @@ def _photographs(source: Path) -> list[Reference]:
 def matching(
     kinds: Sequence[str],
     variant: Variant,
-    shown: Sequence[Reference],
+    references_: Sequence[Reference],
     draw: Drawer,
     draws: np.random.Generator,
 ) -> Iterator[Item]:
-    """Yield two triples of each reference for each kind, "visual" or "emotional": the same ones for both.
+    """Yield two triples of each reference, the same for each kind, "visual" or "emotional".
 
-    The second triple removes and adds another unit where there is one. Heads are turned slightly at random:
-    otherwise the right face would be the one whose pixels are between those of the others.
+    The second triple removes and adds other units if possible. Heads are turned slightly at random, because
+    otherwise the pixels of the right face would lie between those of the other faces.
 
     Raises:
-        RealizerError: no unit can be removed or added so that people see it.
+        RealizerError: no unit can be removed or added visibly.
     """
-    for reference in shown:
+    for reference in references_:
         fewer, more = _fewer(reference.units), _more(reference.units, draws)
-        wanted = [reference.units, *fewer.values(), *more.values()]
-        right, *others = draw(variant, [row(units) for units in wanted])
+        candidates = [reference.units, *fewer.values(), *more.values()]
+        right, *changed_faces = draw(variant, [row(units) for units in candidates])
         names = [("removed", unit) for unit in fewer] + [("added", unit) for unit in more]
-        seen = [named for named, picture in zip(names, others, strict=True) if differs(picture, right)]
+        visible = [
+            named for named, picture in zip(names, changed_faces, strict=True) if differs(picture, right)
+        ]
         changed: dict[str, list[int]] = {"removed": [], "added": []}
-        for role, unit in seen:
+        for role, unit in visible:
             changed[role].append(unit)
         if not all(changed.values()):
             raise RealizerError(
@@ -137,9 +141,11 @@ def _fewer(units: Units) -> dict[int, Units]:
 
 
 def _more(units: Units, draws: np.random.Generator) -> dict[int, Units]:
-    """Return AU -> the expression with it, at random, where co-occurrence lets it be seen; at most `MOST`."""
+    """Return AU -> the expression with it, for at most `MOST` random AUs that co-occurrence does not hide."""
     found: dict[int, Units] = {}
-    for number in draws.permutation([unit for unit in ADDED if unit not in {known for known, _ in units}]):
+    for number in draws.permutation(
+        [unit for unit in ADDED if unit not in {present for present, _ in units}]
+    ):
         new = {**units, (int(number), "BOTH"): float(draws.uniform(LEAST_ADDED, 1))}
         before, moving = AUFrames(np.zeros(2), np.stack([row(units), row(new)]), rules()).moving.T
         columns = [target.column for target in au(int(number))]

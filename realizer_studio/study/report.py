@@ -1,4 +1,4 @@
-"""The results of a study as files: a CSV for each table, and one HTML report with pictures."""
+"""A writer of a study's results: a CSV for each table, and an HTML report with pictures."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ from realizer_studio.study.analysis import tables
 from realizer_studio.study.answers import Answer, inattentive
 
 FACTS = "variant", "reference", "triple", "emotion", "profiles", "strength", "fap", "name", "sign"
-WORST = 12  # items of a kind whose pictures are shown
+WORST = 12  # items of each kind that are shown with pictures
 
 
 def write_report(
@@ -20,35 +20,35 @@ def write_report(
     """Write all tables and report.html into a folder, and return the names of the files.
 
     Args:
-        pictures: folder of the study, from which the report takes pictures if it is there.
-        keep: whether the answers of those who failed attention items count too.
+        pictures: folder of the study; without it, the report has no pictures.
+        keep: whether to include judges who failed attention items.
     """
     folder.mkdir(parents=True, exist_ok=True)
     found = tables(answers, keep)
     write_tables(folder, found)
     failed = set() if keep else set(inattentive(answers))
-    counted = [one for one in answers if (one.who, one.judge) not in failed]
-    shown = _worst(counted, pictures) if pictures.is_dir() else {}
-    write_text(folder / "report.html", html(f"Study {key['study']}", found, shown))
+    counted = [one for one in answers if (one.group, one.judge) not in failed]
+    pictures_of_worst = _worst(counted, pictures) if pictures.is_dir() else {}
+    write_text(folder / "report.html", html(f"Study {key['study']}", found, pictures_of_worst))
     return [*(f"{table.name}.csv" for table in found), "report.html"]
 
 
 def _worst(answers: Sequence[Answer], folder: Path) -> dict[str, list[bytes]]:
-    """Return caption -> pictures of the items that were answered worst, by kind."""
+    """Return caption -> pictures of the items of each kind with the worst answers."""
     by_item: dict[tuple[str, str], list[Answer]] = {}
     for one in answers:
         if "check" not in one.truth and one.kind != "films":
             by_item.setdefault((one.kind, one.item), []).append(one)
     ranked = sorted(by_item.items(), key=lambda found: sum(map(_worth, found[1])) / len(found[1]))
     count: Counter[str] = Counter()
-    shown = {}
+    pictures = {}
     for (kind, _), every in ranked:
         count[kind] += 1
         if count[kind] <= WORST:
             names = [*every[0].truth["shown"].values(), *every[0].truth["options"]]
             files = [folder / name for name in names]
-            shown[_caption(every)] = [file.read_bytes() for file in files if file.is_file()]
-    return shown
+            pictures[_caption(every)] = [file.read_bytes() for file in files if file.is_file()]
+    return pictures
 
 
 def _worth(one: Answer) -> float:
@@ -56,9 +56,9 @@ def _worth(one: Answer) -> float:
 
 
 def _caption(every: Sequence[Answer]) -> str:
-    """Return what an item is, the order of the faces to choose from, and what judges said."""
+    """Return a caption with the facts of an item, the order of its options, and the answers."""
     truth, given = every[0].truth, Counter(one.role for one in every)
     facts = [str(truth[name]) for name in FACTS if name in truth]
     order = [f"faces: {', '.join(truth['options'].values())}"] if truth["options"] else []
-    said = ", ".join(f"{role} {number}" for role, number in given.most_common())
-    return "; ".join([f"{every[0].kind}: {' '.join(facts)}", *order, f"answers: {said}"])
+    replies = ", ".join(f"{role} {number}" for role, number in given.most_common())
+    return "; ".join([f"{every[0].kind}: {' '.join(facts)}", *order, f"answers: {replies}"])

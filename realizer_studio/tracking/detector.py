@@ -1,4 +1,4 @@
-"""The detector: regions of the faces in a picture."""
+"""A detector of faces in a picture."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 MODEL = "face_detection_short_range"
-ANCHORS = ((16, 2), (8, 6))  # squares in a row of the picture, and anchors in the middle of each
+ANCHORS = ((16, 2), (8, 6))  # cells in a row of the picture, and anchors in the centre of each
 MIN_SCORE = 0.5
-SURE = 0.65  # score; less certain faces count only where nothing else is found
+SURE = 0.65  # score; less certain faces count only if no others are found
 MAX_OVERLAP = 0.45  # of two boxes of different faces, relative to the smaller one
-RIGHT_EYE, LEFT_EYE = 2, 3  # of the 8 points of a row: two corners of the box, then those of the face
+RIGHT_EYE, LEFT_EYE = 2, 3  # indices in the 8 points of a face, of which two are the corners of the box
 MARGIN = 1.5  # of a region, relative to the box
-# Of the picture: faces that it shows too small are searched in parts of these sizes that overlap.
+# Sizes of overlapping tiles, relative to the picture, in which small faces are searched.
 TILES = (0.6, 0.3)
-CLOSER = 2.5  # side of the part in which a face is looked at again, relative to its box
+CLOSER = 2.5  # side of the part in which a face is detected again, relative to its box
 
 
 def detect(picture: Image, small: bool = True) -> list[Region]:
     """Return the region of each face, the most certain first.
 
-    `small` looks for small faces too, which takes ten times as long; otherwise parts of the picture are
-    looked at only if the whole shows no face.
+    With `small`, small faces are searched too, which takes ten times as long; without it, tiles are searched
+    only if no face is found in the whole picture.
     """
     width, height = picture.size
     side = max(width, height)
@@ -40,13 +40,13 @@ def detect(picture: Image, small: bool = True) -> list[Region]:
         part = side * share
         xs, ys = (_middles(length, part) for length in (width, height))
         found += [face for y in ys for x in xs for face in _detect(picture, Region(x, y, part))]
-    near = _distinct([again for face in _distinct(found) for again in _closer(picture, face[1])])
+    near = _distinct([again for face in _distinct(found) for again in _refine(picture, face[1])])
     sure = [face for face in near if face[0] >= SURE] or near
     return [Region.around(points[:2], points[RIGHT_EYE], points[LEFT_EYE], MARGIN) for _, points in sure]
 
 
-def _closer(picture: Image, points: Float64) -> list[tuple[float, Float64]]:
-    """Return the face near the middle of a box as it is seen from near, or nothing if there is none."""
+def _refine(picture: Image, points: Float64) -> list[tuple[float, Float64]]:
+    """Return the face in an enlarged part around a box, or an empty list."""
     (x, y), side = points[:2].mean(axis=0), float(np.ptp(points[:2], axis=0).max())
     found = _detect(picture, Region(float(x), float(y), CLOSER * side))
     middle = points[:2].mean(axis=0)
@@ -54,7 +54,7 @@ def _closer(picture: Image, points: Float64) -> list[tuple[float, Float64]]:
 
 
 def _middles(length: float, part: float) -> Float64:
-    """Return the middles of parts that cover a length and overlap by a fifth or more."""
+    """Return the centres of tiles that cover a length and overlap by at least a fifth."""
     if part >= length:
         return np.array([length / 2])
     count = math.ceil((length - part) / (0.8 * part)) + 1
@@ -72,28 +72,30 @@ def _detect(picture: Image, part: Region) -> list[tuple[float, Float64]]:
     half = rows[:, 1] / 2
     rows[:, 1] = rows[:, 0] + half
     rows[:, 0] -= half
-    return [(float(scores[k]), part.place(row)) for k, row in zip(likely, rows, strict=True)]
+    return [(float(scores[k]), part.to_picture(row)) for k, row in zip(likely, rows, strict=True)]
 
 
 @cache
 def _anchors() -> Float64:
-    """Return the middles (896, 2) of the anchors, 0..1, in the order of the network."""
-    places = []
+    """Return the centres (896, 2) of the anchors, 0..1, in the order of the network."""
+    centres = []
     for count, each in ANCHORS:
         y, x = np.mgrid[:count, :count].reshape(2, -1)
-        places.append(np.repeat((np.stack([x, y], axis=1) + 0.5) / count, each, axis=0))
-    return np.concatenate(places)
+        centres.append(np.repeat((np.stack([x, y], axis=1) + 0.5) / count, each, axis=0))
+    return np.concatenate(centres)
 
 
 def _distinct(found: list[tuple[float, Float64]]) -> list[tuple[float, Float64]]:
-    """Merge the boxes of one face to their mean, weighted by score, without those of parts of it."""
-    rest, faces = sorted(found, key=lambda face: -face[0]), []
-    while rest:
-        same = [face for face in rest if _overlap(face[1], rest[0][1]) > MAX_OVERLAP]
-        rest = [face for face in rest if _overlap(face[1], rest[0][1]) <= MAX_OVERLAP]
-        sizes = np.array([np.prod(points[1] - points[0]) for _, points in same])
-        weights = np.array([score for score, _ in same]) * (sizes > sizes.max() / 2)
-        faces.append((same[0][0], np.average([points for _, points in same], axis=0, weights=weights)))
+    """Merge the boxes of each face to their mean, weighted by score, ignoring boxes of parts of the face."""
+    remaining, faces = sorted(found, key=lambda face: -face[0]), []
+    while remaining:
+        overlapping = [face for face in remaining if _overlap(face[1], remaining[0][1]) > MAX_OVERLAP]
+        remaining = [face for face in remaining if _overlap(face[1], remaining[0][1]) <= MAX_OVERLAP]
+        sizes = np.array([np.prod(points[1] - points[0]) for _, points in overlapping])
+        weights = np.array([score for score, _ in overlapping]) * (sizes > sizes.max() / 2)
+        faces.append(
+            (overlapping[0][0], np.average([points for _, points in overlapping], axis=0, weights=weights))
+        )
     return faces
 
 

@@ -1,4 +1,4 @@
-"""Files of a recording: FAPs, tables, JSON, and a document that plays it again."""
+"""Files of a recording: FAPs, CSV, JSON, and BML that replays it."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -19,10 +19,10 @@ from realizer.outputs.fap_text import encode
 from realizer.tables import by_number, faps
 from realizer.tables.cooccurrence import rules
 from realizer_studio.tracking.recording import Recording
-from realizer_studio.tracking.regressor import SEEN_FAPS, SEEN_UNITS, Measured
+from realizer_studio.tracking.regressor import MEASURED_FAPS, MEASURED_UNITS, Measured
 
 HEAD = (48, 49, 50)
-# FAPs of rotations, which both eyes share -> the action unit of a positive value, and of a negative one.
+# FAPs of a rotation (of both eyes or the head) -> action units of positive and negative values.
 ROTATIONS: Mapping[tuple[int, ...], tuple[int, int]] = {
     (48,): (54, 53),
     (49,): (51, 52),
@@ -33,8 +33,8 @@ ROTATIONS: Mapping[tuple[int, ...], tuple[int, int]] = {
 
 
 def unit_columns(measured: Recording | Measured) -> dict[str, Float64]:
-    """Return the values (n,) 0..1 of all action units that are measured, with those of head and eyes."""
-    columns = dict(zip(SEEN_UNITS, measured.units.T, strict=True))
+    """Return the values (n,) 0..1 of all measured action units, including those of head and eyes."""
+    columns = dict(zip(MEASURED_UNITS, measured.units.T, strict=True))
     for numbers, units in ROTATIONS.items():
         degrees = np.degrees(measured.faps[:, np.array(numbers) - 1].mean(axis=1) * ANGLE_UNIT)
         for sign, unit in zip((1, -1), units, strict=True):
@@ -44,9 +44,9 @@ def unit_columns(measured: Recording | Measured) -> dict[str, Float64]:
 
 
 def by_mapping(recording: Recording, face: str) -> Recording:
-    """Return the recording with FAPs that a face's mapping makes from the action units; raises FaceError."""
+    """Return the recording with FAPs computed from its action units by a face's mapping; raises FaceError."""
     rows = np.zeros((len(recording.times), len(axis())), np.float32)
-    rows[:, [axis()[name].column for name in SEEN_UNITS]] = recording.units
+    rows[:, [axis()[name].column for name in MEASURED_UNITS]] = recording.units
     faps = to_fap(AUFrames(recording.times, rows, rules()), mapping_of(face)).values.astype(np.float64)
     turned = [fap - 1 for numbers in ROTATIONS for fap in numbers]
     faps[:, turned] = recording.faps[:, turned]
@@ -54,16 +54,16 @@ def by_mapping(recording: Recording, face: str) -> Recording:
 
 
 def mask() -> Bool:
-    """Return (68,) which FAPs are measured."""
-    seen = np.zeros(68, bool)
-    seen[np.array([*SEEN_FAPS, *HEAD]) - 1] = True
-    return seen
+    """Return (68,) whether each FAP is measured."""
+    measured = np.zeros(68, bool)
+    measured[np.array([*MEASURED_FAPS, *HEAD]) - 1] = True
+    return measured
 
 
-def clip_of(faps: Float64, seen: Bool, fps: float, name: str) -> FAPClip:
-    """Return FAPs (n, 68), of which some are seen, as a clip of at least two frames."""
+def clip_of(faps: Float64, observed: Bool, fps: float, name: str) -> FAPClip:
+    """Return FAPs (n, 68), with a mask (68,) of observed ones, as a clip of at least two frames."""
     values = np.repeat(faps, 2, axis=0) if len(faps) == 1 else faps
-    frames = FAPFrames(np.arange(len(values)) / fps, values.astype(np.float32), seen)
+    frames = FAPFrames(np.arange(len(values)) / fps, values.astype(np.float32), observed)
     return FAPClip.of(frames, fps, name)
 
 
@@ -73,10 +73,10 @@ def _clip(recording: Recording, name: str) -> FAPClip:
 
 def _csv(recording: Recording, name: str) -> str:
     columns = unit_columns(recording)
-    rows = zip(recording.times, recording.seen, zip(*columns.values(), strict=True), strict=True)
+    rows = zip(recording.times, recording.visible, zip(*columns.values(), strict=True), strict=True)
     return csv_text(
         ["time", *(f"AU{unit}" for unit in columns)],
-        ([f"{time:.6f}", *(f"{v:.4f}" if there else "" for v in values)] for time, there, values in rows),
+        ([f"{time:.6f}", *(f"{v:.4f}" if visible else "" for v in values)] for time, visible, values in rows),
     )
 
 
@@ -88,7 +88,7 @@ def _json(recording: Recording, name: str) -> str:
         "fps": recording.fps,
         "frames": len(recording.times),
         "duration": float(recording.times[-1]),
-        "seen": recording.seen.tolist(),
+        "seen": recording.visible.tolist(),
         "au": {"names": list(columns), "values": values.round(4).tolist()},
         "head": {"names": ["pitch", "yaw", "roll"], "values": turned.round(2).tolist()},
         "fap": {

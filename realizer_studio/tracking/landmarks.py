@@ -1,4 +1,4 @@
-"""468 landmarks of a face with depth, and the contours of its eyes."""
+"""A network for 468 landmarks of a face with depth, and the contours of its eyes."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ POINTS, PRESENCE, TRAITS = "conv2d_21", "conv2d_31", "p_re_lu_17"
 CONTOUR, IRIS = "output_eyes_contours_and_brows", "output_iris"
 IRIS_MIDDLE = 71  # row of `Landmarks.eyes`
 MIN_PRESENCE = 0.5
-NEW_PRESENCE = 0.9  # of a face that was not there in the picture before; letters of a title reach 0.65
-# Corners of the eyes from left to right in the picture of someone who faces it: right eye outer and inner,
-# left eye inner and outer.
+NEW_PRESENCE = 0.9  # of a face that was not in the previous picture; letters of a title reach 0.65
+# Corners of the eyes from left to right in a frontal picture: right eye outer and inner, left eye inner and
+# outer.
 RIGHT_EYE, LEFT_EYE = (33, 133), (362, 263)
 MARGIN, EYE_MARGIN = 1.5, 2.3  # of a region, relative to the points
 
@@ -33,23 +33,23 @@ class Landmarks:
     """A face in a picture."""
 
     points: Float64  # (468, 3) pixels: x right, y down, and depth away from the camera
-    presence: float  # 0..1, how likely there is a face
-    traits: Float32  # (1152,) what the last layer before the points says; it also tells of wrinkles and teeth
-    # (2, 76, 2) points of the left and the right eye: 71 of contour and brow, 5 of the iris. They are in the
-    # square around the eye, 0..1, mirrored for the left one.
+    presence: float  # 0..1, the probability of a face
+    traits: Float32  # (1152,) outputs of the last inner layer, which also depend on wrinkles and teeth
+    # (2, 76, 2) points of the left and the right eye, 71 of contour and brow and 5 of the iris, in
+    # coordinates 0..1 of the square around the eye, which is mirrored for the left one.
     eyes: Float32
 
     @property
     def region(self) -> Region:
-        """The region in which the face of the next picture is looked for."""
+        """The region in which the face is searched in the next picture."""
         return face_region(self.points)
 
     @property
     def irises(self) -> Float64:
-        """The middles of the irises (2, 2) in pixels, of the left and the right eye."""
+        """The centres of the left and the right iris (2, 2) in pixels."""
         squares = (eye_region(self.points, corners) for corners in (LEFT_EYE, RIGHT_EYE))
         both = zip(squares, self.eyes, strict=True)
-        return np.array([square.place(eye[[IRIS_MIDDLE]])[0] for square, eye in both])
+        return np.array([square.to_picture(eye[[IRIS_MIDDLE]])[0] for square, eye in both])
 
 
 def face_region(points: Float64) -> Region:
@@ -58,7 +58,7 @@ def face_region(points: Float64) -> Region:
 
 
 def eye_region(points: Float64, corners: tuple[int, int]) -> Region:
-    """Return the square around an eye between two landmarks; that of the left eye is mirrored."""
+    """Return the square around an eye with two landmarks as corners; that of the left eye is mirrored."""
     first, last = points[list(corners), :2]
     return replace(Region.around([first, last], first, last, EYE_MARGIN), mirrored=corners == LEFT_EYE)
 
@@ -66,11 +66,11 @@ def eye_region(points: Float64, corners: tuple[int, int]) -> Region:
 def landmarks(picture: Image, region: Region, refine: bool = False) -> Landmarks:
     """Return the landmarks of the face in a region of a picture.
 
-    `refine` looks again in the region of the landmarks, as that of a detector is not as good.
+    With `refine`, the landmarks are computed again in their own region, which is better than the detector's.
     """
     model = network(MODEL, TRAITS)
     outputs = model(region.cut(picture, model.size))
-    points = region.place(outputs[POINTS].reshape(COUNT, 3) / model.size)
+    points = region.to_picture(outputs[POINTS].reshape(COUNT, 3) / model.size)
     presence = 1 / (1 + math.exp(-float(np.clip(outputs[PRESENCE].item(), -50, 50))))
     if refine and presence >= MIN_PRESENCE:
         return landmarks(picture, face_region(points))

@@ -1,4 +1,4 @@
-"""A face in front of a camera, picture by picture, as it moves."""
+"""Live measurement of a face in front of a camera."""
 
 import io
 import math
@@ -19,14 +19,14 @@ from realizer_studio.tracking.network import TrackingError
 from realizer_studio.tracking.recording import QUIET
 from realizer_studio.tracking.regressor import Measured, components, measure
 
-REMEMBERED = 300  # pictures in which the face at rest is looked for
-ENOUGH = 10  # of them; before, a face is compared with people in general
-SMOOTHING = 0.05  # s, in which an old value loses most of its weight
+REMEMBERED = 300  # pictures from which the face at rest is estimated
+ENOUGH = 10  # least number of pictures for that; with fewer, faces are measured without it
+SMOOTHING = 0.05  # s; time constant of the smoothing
 
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a picture shows."""
+    """The measurement of a picture."""
 
     units: Mapping[str, float]  # action units by name, 0..1, with those of head and eyes
     head: tuple[float, float, float]  # degrees of pitch, yaw and roll
@@ -35,7 +35,7 @@ class Sight:
 
 
 class Mirror:
-    """Measures the face in each picture; keeps where it was and what it was like, but no picture."""
+    """A measurement of the face in each picture of a sequence; pictures are not stored."""
 
     def __init__(self) -> None:
         self._face: Landmarks | None = None
@@ -43,7 +43,11 @@ class Mirror:
         self._smooth: tuple[float, Measured] | None = None
 
     def __call__(self, jpeg: bytes, time: float) -> Sight | None:
-        """Return what a picture at a time in seconds shows, or None; raises TrackingError for none."""
+        """Return the measurement of a picture at a time in seconds, or None if no face is found.
+
+        Raises:
+            TrackingError: the bytes are no picture.
+        """
         try:
             with Image.open(io.BytesIO(jpeg), formats=("JPEG", "PNG", "WEBP")) as file:
                 picture = file.convert("RGB")
@@ -67,19 +71,20 @@ class Mirror:
         return next((face for face in found if face.presence >= NEW_PRESENCE), None)
 
     def _sight(self, face: Landmarks, time: float) -> Sight:
-        seen = components([face])
-        quiet = sorted(self._past, key=lambda past: past[0])[: math.ceil(QUIET * len(self._past))]
-        neutral = np.mean([values for _, values in quiet], axis=0) if len(self._past) >= ENOUGH else None
-        now = measure(seen, neutral)
-        self._past.append((float(now.units.sum()), seen.values[0]))
+        face_components = components([face])
+        calmest = sorted(self._past, key=lambda past: past[0])[: math.ceil(QUIET * len(self._past))]
+        neutral = np.mean([values for _, values in calmest], axis=0) if len(self._past) >= ENOUGH else None
+        measured = measure(face_components, neutral)
+        self._past.append((float(measured.units.sum()), face_components.values[0]))
         if self._smooth is not None:
             before, last = self._smooth
             share = math.exp(-max(time - before, 0.0) / SMOOTHING)
-            now = Measured(
-                share * last.units + (1 - share) * now.units, share * last.faps + (1 - share) * now.faps
+            measured = Measured(
+                share * last.units + (1 - share) * measured.units,
+                share * last.faps + (1 - share) * measured.faps,
             )
-        self._smooth = time, now
-        emotion, certainty = recogniser("own").certainties(now.faps, mask())[0]
-        pitch, yaw, roll = np.degrees(now.faps[0, np.array(HEAD) - 1] * ANGLE_UNIT).round(2).tolist()
-        units = {name: round(float(value[0]), 4) for name, value in unit_columns(now).items()}
+        self._smooth = time, measured
+        emotion, certainty = recogniser("own").certainties(measured.faps, mask())[0]
+        pitch, yaw, roll = np.degrees(measured.faps[0, np.array(HEAD) - 1] * ANGLE_UNIT).round(2).tolist()
+        units = {name: round(float(value[0]), 4) for name, value in unit_columns(measured).items()}
         return Sight(units, (pitch, yaw, roll), emotion, round(certainty, 3))

@@ -1,4 +1,4 @@
-"""The networks that find faces, run by ai-edge-litert."""
+"""Neural networks for faces, run by ai-edge-litert."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ INSTALL = "finding faces in pictures needs ai-edge-litert: pip install 'bml-real
 
 
 class TrackingError(RealizerError):
-    """Pictures that cannot be tracked; the message says which file, and what to do."""
+    """Pictures cannot be tracked; the message names the file and a remedy."""
 
 
 class Network:
-    """A network of one picture; what its inner layers say can be read, too.
+    """A network with one picture as input, whose inner layers can be read too.
 
     Attributes:
-        size: width and height of the pictures it takes, in pixels.
+        size: width and height of the input in pixels.
     """
 
-    def __init__(self, name: str, inner: tuple[str, ...] = ()) -> None:
-        """Load `name`.tflite of `models`; `inner` names tensors that are wanted beside the outputs.
+    def __init__(self, name: str, inner_layers: tuple[str, ...] = ()) -> None:
+        """Load `name`.tflite from `models`; `inner_layers` names tensors to return with the outputs.
 
         Raises:
             RealizerError: ai-edge-litert is not installed.
@@ -42,14 +42,18 @@ class Network:
         from ai_edge_litert.interpreter import Interpreter
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # it says that reading inner layers takes memory
+            warnings.simplefilter("ignore")  # about the memory for inner layers
             self._run: Any = Interpreter(
-                str(FOLDER / f"{name}.tflite"), num_threads=1, experimental_preserve_all_tensors=bool(inner)
+                str(FOLDER / f"{name}.tflite"),
+                num_threads=1,
+                experimental_preserve_all_tensors=bool(inner_layers),
             )
         self._run.allocate_tensors()
         self._input = self._run.get_input_details()[0]["index"]
         self._outputs = {row["name"]: row["index"] for row in self._run.get_output_details()}
-        self._outputs |= {r["name"]: r["index"] for r in self._run.get_tensor_details() if r["name"] in inner}
+        self._outputs |= {
+            r["name"]: r["index"] for r in self._run.get_tensor_details() if r["name"] in inner_layers
+        }
         self.size = int(self._run.get_input_details()[0]["shape"][1])
 
     def __call__(self, picture: Image, low: float = 0.0) -> dict[str, Float32]:
@@ -62,5 +66,5 @@ class Network:
 
 @cache
 def network(name: str, *inner: str) -> Network:
-    """Return the network of that name; it is loaded once."""
+    """Return a network by its name; it is loaded once."""
     return Network(name, inner)

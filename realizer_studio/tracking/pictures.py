@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-EARLY = 0.5  # s of a film without pictures at its end that are worth a warning
-MOST_BROKEN = 10_000  # parts of a film
-LARGEST = 1920  # pixels; longer sides of photographs are reduced to this, as faces are looked at in 192
+EARLY = 0.5  # s without pictures at the end of a film that cause a warning
+MOST_BROKEN = 10_000  # broken parts of a film, after which reading stops
+LARGEST = 1920  # pixels; longer sides of photographs are reduced to this
 INSTALL = "reading films needs PyAV: pip install 'bml-realizer[track]'"
 
 
@@ -30,7 +30,7 @@ class Picture:
 
     time: float  # seconds from the first
     image: Image  # RGB, upright
-    name: str  # the file and the time in it, for messages
+    name: str  # file and time, for messages
 
 
 def read_pictures(path: Path, fps: float = 25.0) -> tuple[int, Iterator[Picture]]:
@@ -38,10 +38,10 @@ def read_pictures(path: Path, fps: float = 25.0) -> tuple[int, Iterator[Picture]
 
     Args:
         path: a picture, a film, or a folder of pictures, which are ordered by the numbers in their names.
-        fps: of a folder.
+        fps: the rate of a folder.
 
     Raises:
-        TrackingError: nothing that can be read; the text says which file. Iterating may raise it, too.
+        TrackingError: a file cannot be read; also raised by the iterator.
     """
     if path.is_dir():
         files = sorted((file for file in path.iterdir() if is_picture(file)), key=_natural)
@@ -54,7 +54,7 @@ def read_pictures(path: Path, fps: float = 25.0) -> tuple[int, Iterator[Picture]
 
 
 def is_picture(path: Path) -> bool:
-    """Return whether the name of a file is that of a picture."""
+    """Return whether a file has the suffix of a picture."""
     from PIL import Image
 
     Image.init()
@@ -62,12 +62,12 @@ def is_picture(path: Path) -> bool:
 
 
 def read_picture(path: Path) -> Image:
-    """Read a picture, transparent parts in black; raises TrackingError if it is none, or cut off."""
+    """Read a picture over black; raises TrackingError if the file is no picture, or truncated."""
     from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
         with Image.open(path) as image:
-            image.draft("RGB", (LARGEST, LARGEST))  # JPEG: decode only as fine as wanted
+            image.draft("RGB", (LARGEST, LARGEST))  # decodes JPEG at a reduced size
             upright = ImageOps.exif_transpose(image)
             if upright.mode.startswith("I"):  # 16 bits of grey
                 upright = upright.point(lambda value: value / 256).convert("L")
@@ -81,7 +81,11 @@ def read_picture(path: Path) -> Image:
 
 
 def _folder(files: list[Path], fps: float) -> Iterator[Picture]:
-    """Yield the pictures of files; those that cannot be read are left out with a warning, but not all."""
+    """Yield the pictures of files; unreadable ones are skipped with a warning.
+
+    Raises:
+        TrackingError: all are unreadable.
+    """
     found = 0
     for k, file in enumerate(files):
         try:
@@ -140,16 +144,16 @@ def _film(path: Path) -> tuple[int, Iterator[Picture]]:
                     image = image.rotate(turn, expand=True)
                 image.thumbnail((LARGEST, LARGEST))
                 yield Picture(time - first, image, f"{path} at {time - first:.2f} s")
-            said = _words(broken[0]) if broken else "no picture"
+            reason = _words(broken[0]) if broken else "no picture"
             if last is None:
                 codec = stream.codec_context.name if stream.codec_context else "an unknown codec"
                 raise TrackingError(
-                    f"{path}: wanted a film that FFmpeg can decode, got {codec}: {said}; convert it to "
+                    f"{path}: wanted a film that FFmpeg can decode, got {codec}: {reason}; convert it to "
                     "H.264, or copy or record it again"
                 )
             if broken:
                 log.warning(
-                    "%s: parts of it are broken, %d in all (%s); the rest is kept", path, len(broken), said
+                    "%s: parts of it are broken, %d in all (%s); the rest is kept", path, len(broken), reason
                 )
             if last - first < length - EARLY:
                 log.warning(
@@ -160,7 +164,7 @@ def _film(path: Path) -> tuple[int, Iterator[Picture]]:
 
 
 def _decoded(container: Any, stream: Any, broken: list[Exception]) -> Iterator[Any]:
-    """Yield the frames of a film; errors of broken parts, which are passed over, are added to a list."""
+    """Yield the frames of a film; broken parts are skipped, and their errors added to a list."""
     from av.error import FFmpegError
 
     packets = container.demux(stream)

@@ -1,4 +1,4 @@
-"""Turned squares in a picture, which networks see upright."""
+"""Rotated squares in a picture, which are the inputs of networks."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Region:
     y: float  # its centre in pixels from the top left corner
     side: float  # its length in pixels
     angle: float = 0.0  # radians by which it is turned clockwise
-    mirrored: bool = False  # whether it is seen as in a mirror
+    mirrored: bool = False  # whether the network gets its mirror image
 
     @classmethod
     def around(cls, points: Any, left: Any, right: Any, scale: float) -> Region:
         """Return the region around points (n, 2) whose upper edge is parallel to the line from left to right.
 
         Args:
-            left, right: (2,) pixels, of the picture's left and right.
-            scale: its side, relative to the longer side of the turned box of the points.
+            left, right: (2,) pixels, in the order of the picture.
+            scale: the side, relative to the longer side of the rotated bounding box of the points.
         """
         angle = math.atan2(right[1] - left[1], right[0] - left[0])
         upright = np.asarray(points, np.float64) @ _turn(angle)
@@ -37,26 +37,28 @@ class Region:
         return cls(float(x), float(y), float((high - low).max()) * scale, angle)
 
     def cut(self, picture: Image.Image, pixels: int) -> Image.Image:
-        """Return the square as an upright picture; what is outside the picture is black."""
+        """Return the square as an upright picture, black outside the original picture."""
         factor = max(1, int(self.side / pixels / 1.5))
-        place = np.array([self.x, self.y])
-        if factor > 1:  # or fine detail would make noise
+        centre = np.array([self.x, self.y])
+        if factor > 1:  # against aliasing
             reach = self.side / 2 * (abs(math.cos(self.angle)) + abs(math.sin(self.angle))) + factor
-            left, top, right, bottom = (int(v) for v in (*np.maximum(place - reach, 0), *(place + reach + 1)))
+            left, top, right, bottom = (
+                int(v) for v in (*np.maximum(centre - reach, 0), *(centre + reach + 1))
+            )
             box = left, top, min(right, picture.width), min(bottom, picture.height)
             if box[0] < box[2] and box[1] < box[3]:
-                picture, place = picture.reduce(factor, box), place - (left, top)
+                picture, centre = picture.reduce(factor, box), centre - (left, top)
         (a, b), (c, d) = self._axes() * (self.side / pixels / factor)
-        x, y = place / factor - np.array([a + b, c + d]) * (pixels / 2)
+        x, y = centre / factor - np.array([a + b, c + d]) * (pixels / 2)
         numbers = tuple(map(float, (a, b, x, c, d, y)))
         return picture.transform((pixels, pixels), Image.Transform.AFFINE, numbers, Image.Resampling.BILINEAR)
 
-    def place(self, points: Any) -> Float64:
-        """Return points (n, 2 or 3) of the square, 0..1, in pixels of the picture; depths grow with it."""
+    def to_picture(self, points: Any) -> Float64:
+        """Return points (n, 2 or 3) of the square, 0..1, in pixels of the picture; depths are scaled too."""
         points = np.asarray(points, np.float64)
-        places: Float64 = points * self.side
-        places[:, :2] = (points[:, :2] - 0.5) @ (self._axes() * self.side).T + (self.x, self.y)
-        return places
+        pixels: Float64 = points * self.side
+        pixels[:, :2] = (points[:, :2] - 0.5) @ (self._axes() * self.side).T + (self.x, self.y)
+        return pixels
 
     def _axes(self) -> Float64:
         """Return the directions of the square's axes as columns."""
@@ -64,5 +66,5 @@ class Region:
 
 
 def _turn(angle: float) -> Float64:
-    """Return the matrix that turns clockwise, where y is down."""
+    """Return the matrix of a clockwise rotation, with y down."""
     return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])

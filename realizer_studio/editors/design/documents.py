@@ -1,4 +1,4 @@
-"""Timelines from texts and documents, and documents from timelines."""
+"""Conversion of texts and documents to timelines, and of timelines to documents."""
 
 import tempfile
 from collections.abc import Iterable, Sequence
@@ -41,10 +41,10 @@ from realizer.tables.knowledge import Mood
 from realizer_studio.editors.design.fap_entries import fap_entries, is_fap
 from realizer_studio.editors.design.frames import FILE, document
 
-MAX_TEXT = 5_000  # characters that are spoken
-PEAKS = 100  # of the sound, a second
-NUMBERS = ("fap", "json", "csv")  # forms that `realizer timeline` writes, too
-LOST = 0.002  # s; smaller differences of times come from rounding
+MAX_TEXT = 5_000  # characters of speech
+PEAKS = 100  # peaks of the sound per second
+NUMBERS = ("fap", "json", "csv")  # forms that `realizer timeline` writes as well
+LOST = 0.002  # s; smaller differences of times are rounding errors
 
 
 @dataclass
@@ -59,7 +59,7 @@ class Opened:
     """
 
     timeline: dict[str, object]
-    left_out: list[str] = field(default_factory=list)  # what a timeline cannot hold, a sentence each
+    left_out: list[str] = field(default_factory=list)  # a sentence for each part that a timeline cannot have
     says: list[tuple[float, str]] = field(default_factory=list)
     words: list[tuple[float, float, str]] = field(default_factory=list)
     syncs: list[tuple[float, str]] = field(default_factory=list)
@@ -67,14 +67,14 @@ class Opened:
 
 
 def open_file(text: str, settings: Settings) -> Opened:
-    """Read a timeline file (TOML, JSON), or the expressions of BML or of a FAP file.
+    """Read a timeline from a timeline file (TOML, JSON), BML or a FAP file.
 
     Raises:
-        RealizerError: it is none of them; the text has a line for each fault.
+        RealizerError: it is none of them; the message has a line for each fault.
     """
     if is_fap(text):
-        shown, kept, left = fap_entries(text, list(library_of(settings.library_folder).values()))
-        return Opened(timeline_json(Timeline((*_lanes(shown), *_lanes(kept, "FAPs ")))), left)
+        expressions, keyframes, losses = fap_entries(text, list(library_of(settings.library_folder).values()))
+        return Opened(timeline_json(Timeline((*_tracks(expressions), *_tracks(keyframes, "FAPs ")))), losses)
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         timeline = read_timeline(text.encode())
         unknown = [
@@ -88,10 +88,10 @@ def open_file(text: str, settings: Settings) -> Opened:
 
 
 def enrich_text(text: str, settings: Settings, mood: Mood | None = None, *, listener: bool = False) -> Opened:
-    """Return the expressions that people show while they say a text, or listen to it, with their reasons.
+    """Return a timeline of the expressions that rules add to a text, for a speaker or listener.
 
     Raises:
-        ValueError: there is no text, or too much.
+        ValueError: no text, or a too long one.
     """
     if len(text) > MAX_TEXT:
         raise ValueError(f"wanted at most {MAX_TEXT} characters, got {len(text)}")
@@ -114,19 +114,19 @@ def _from_bml(documents: Sequence[str], settings: Settings) -> Opened:
             raise TableError(str(item))
         blocks.append(item)
     schedules, refused = plan(documents, player, settings.voice)
-    shown, left = list[tuple[float, Entry]](), [warning.text for warning in refused]
+    entries, losses = list[tuple[float, Entry]](), [warning.text for warning in refused]
     for block, schedule in zip(blocks, schedules, strict=False):
-        shown += _expressions(block, schedule, left)
-    keyed = [one for one in shown if one[1].is_keyframes]
-    named = [one for one in shown if one[1].is_expression]
-    found = Opened(timeline_json(Timeline((*_lanes(named), *_lanes(keyed, "FAPs ")))), left)
+        entries += _expressions(block, schedule, losses)
+    keyed = [one for one in entries if one[1].is_keyframes]
+    named = [one for one in entries if one[1].is_expression]
+    found = Opened(timeline_json(Timeline((*_tracks(named), *_tracks(keyed, "FAPs ")))), losses)
     for speech in player.speech():
-        begin, said = speech.start, speech.utterance
-        found.words += [(begin + word.start, begin + word.end, word.text) for word in said.words]
-        found.syncs += [(begin + time, name) for name, time in said.marks.items()]
-        if said.pcm is not None:
+        begin, utterance = speech.start, speech.utterance
+        found.words += [(begin + word.start, begin + word.end, word.text) for word in utterance.words]
+        found.syncs += [(begin + time, name) for name, time in utterance.marks.items()]
+        if utterance.pcm is not None:
             found.peaks += [0.0] * (round(begin * PEAKS) - len(found.peaks))
-            found.peaks += _peaks(said.pcm, said.sample_rate)
+            found.peaks += _peaks(utterance.pcm, utterance.sample_rate)
     for block, schedule in zip(blocks, schedules, strict=False):
         for node in block.behaviours:
             if isinstance(node, Speech) and node.text and node.id in schedule.times:
@@ -137,30 +137,30 @@ def _from_bml(documents: Sequence[str], settings: Settings) -> Opened:
 
 def _peaks(pcm: np.ndarray, rate: int) -> list[float]:
     size = max(1, rate // PEAKS)
-    whole = np.abs(pcm[: len(pcm) // size * size].astype(np.int32)).reshape(-1, size)
-    return [round(float(peak), 2) for peak in whole.max(axis=1) / 32768]
+    windows = np.abs(pcm[: len(pcm) // size * size].astype(np.int32)).reshape(-1, size)
+    return [round(float(peak), 2) for peak in windows.max(axis=1) / 32768]
 
 
-def _expressions(block: Block, schedule: Schedule, left: list[str]) -> Iterable[tuple[float, Entry]]:
-    """Yield start and entry of each expression, and add to `left` what a timeline cannot hold."""
+def _expressions(block: Block, schedule: Schedule, losses: list[str]) -> Iterable[tuple[float, Entry]]:
+    """Yield start and entry of each expression, and add sentences about omitted behaviours to `losses`."""
     for node in block.behaviours:
         times = schedule.times.get(node.id)
         if times is None:
-            left.append(f"{node.id}: it is not played")
+            losses.append(f"{node.id}: it is not played")
         elif isinstance(node, Expression | FaceLexeme):
-            name, amount, because = _shown(node)
-            at = dict(zip(schedule.points[node.id], (schedule.start + times).tolist(), strict=True))
-            start, end = at["start"], at["end"]
-            lengths = (end - start, at["attackPeak"] - start, end - at["relax"])
+            name, amount, because = _name_and_amount(node)
+            point_times = dict(zip(schedule.points[node.id], (schedule.start + times).tolist(), strict=True))
+            start, end = point_times["start"], point_times["end"]
+            lengths = (end - start, point_times["attackPeak"] - start, end - point_times["relax"])
             duration, onset, offset = (round(max(seconds, MIN_SECONDS), 3) for seconds in lengths)
             yield start, Entry(name, amount, duration, onset, offset, because)
         elif isinstance(node, FaceKeyframe) and node.type == "FAPS":
             yield _keyframes(node, schedule.start + float(times[0]), float(times[-1] - times[0]))
         elif not isinstance(node, Speech):
-            left.append(f"{node.id}: a timeline holds expressions, got <{local(node.tag)}>")
+            losses.append(f"{node.id}: a timeline holds expressions, got <{local(node.tag)}>")
 
 
-def _shown(node: Expression | FaceLexeme) -> tuple[str, float, str | None]:
+def _name_and_amount(node: Expression | FaceLexeme) -> tuple[str, float, str | None]:
     if isinstance(node, Expression):
         return node.name, node.intensity, node.because
     return node.lexeme, node.amount, None
@@ -173,10 +173,10 @@ def _keyframes(node: FaceKeyframe, start: float, duration: float) -> tuple[float
     return start, Entry("keyframes", duration=round(duration, 3), faps=faps, keys=tuple(map(tuple, rows)))
 
 
-def _lanes(shown: list[tuple[float, Entry]], name: str = "") -> tuple[Track, ...]:
-    """Return channels of entries at these starts: each in the first channel that has room for it."""
+def _tracks(placed_entries: list[tuple[float, Entry]], name: str = "") -> tuple[Track, ...]:
+    """Return tracks of entries with their starts, each on the first track that is free."""
     lanes: list[tuple[float, list[Entry], float]] = []  # start, entries, end
-    for start, entry in sorted(shown, key=lambda one: one[0]):
+    for start, entry in sorted(placed_entries, key=lambda one: one[0]):
         start, length = round(start, 3), entry.duration or 0.0
         for k, (begin, entries, end) in enumerate(lanes):
             if start - end >= MIN_SECONDS or abs(start - end) < LOST:
@@ -192,13 +192,13 @@ def sound(says: Sequence[tuple[float, str]], settings: Settings) -> Int16:
     """Return speeches of (start, text) as (n,) int16 of `RATE`; (0,) if the voice is silent.
 
     Raises:
-        ValueError: too much text.
+        ValueError: the text is too long.
     """
     if sum(len(text) for _, text in says) > MAX_TEXT:
         raise ValueError(f"wanted at most {MAX_TEXT} characters")
     block = Block(id="speech", children=_speeches(says))
-    heard = play([write(block)], settings.play_options(), settings.voice).sound(RATE)
-    return heard if heard.any() else heard[:0]
+    samples = play([write(block)], settings.play_options(), settings.voice).sound(RATE)
+    return samples if samples.any() else samples[:0]
 
 
 def _speeches(says: Sequence[tuple[float, str]]) -> tuple[Speech, ...]:
@@ -214,13 +214,13 @@ def _speeches(says: Sequence[tuple[float, str]]) -> tuple[Speech, ...]:
 
 
 def export(timeline: Timeline, form: str, settings: Settings, says: Sequence[tuple[float, str]] = ()) -> str:
-    """Return a timeline in another form: toml, json (the timeline), bml, or numbers: fap, csv.
+    """Return a timeline as toml, json, bml, fap or csv.
 
     Args:
-        says: (start, text) of what BML speaks.
+        says: (start, text) of the speeches in BML.
 
     Raises:
-        ValueError: no such form.
+        ValueError: an unknown form.
     """
     if form == "toml":
         return write_timeline(timeline)
@@ -238,7 +238,7 @@ def export(timeline: Timeline, form: str, settings: Settings, says: Sequence[tup
 
 
 def _block(timeline: Timeline, settings: Settings, says: Sequence[tuple[float, str]]) -> Block:
-    """Return a block with a behaviour for each entry; it loses curves, joins and the mixer."""
+    """Return a block with a behaviour for each entry, without curves, joins and mixer."""
     library = library_of(settings.library_folder)
     children: list[Speech | Expression | FaceKeyframe] = [*_speeches(says)]
     for number, track in enumerate(timeline.tracks, 1):

@@ -1,4 +1,4 @@
-"""The frames of a FAP file as entries of a timeline: expressions, and keyframes that none of them shows."""
+"""Conversion of a FAP file to entries of a timeline: expressions, and keyframes for the rest."""
 
 import math
 import re
@@ -24,10 +24,13 @@ from realizer_studio.corpus.recording import Recording
 FPS = 25.0
 MOST_FRAMES = 7500  # five minutes
 MOST_NUMBERS = 100_000  # of keyframes; the page sends them with every question
-MOST, WORTH = 10, 0.02  # expressions, and the least share of all squared movement that one more explains
+MOST, LEAST_GAIN = (
+    10,
+    0.02,
+)  # expressions at most; least share of the squared displacement that one more explains
 LEAST = 0.06  # intensity of an entry
-VALLEY = 0.6  # of the smaller of two peaks; what falls below between them is two entries
-WHOLE = 0.9  # of its peak, from which an entry counts as reached
+VALLEY = 0.6  # of the smaller of two peaks; a deeper valley between them separates two entries
+REACHED = 0.9  # of its peak, between onset and offset of an entry
 
 
 def is_fap(text: str) -> bool:
@@ -40,12 +43,11 @@ def is_fap(text: str) -> bool:
 def fap_entries(
     text: str, library: Sequence[Expression]
 ) -> tuple[list[tuple[float, Entry]], list[tuple[float, Entry]], list[str]]:
-    """Return start and entry of the expressions that a FAP file shows, of its keyframes, and notes.
+    """Return start and entry of the expressions in a FAP file, of its keyframes, and notes.
 
-    Expressions are chosen one after the other, each the one that explains most of what is left, with
-    intensities by non-negative least squares in millimetres of the face; a peak of one becomes an entry.
-    A movement between two rests that expressions do not explain stays as it is, as keyframes; so do turns
-    of the head and visemes, the latter as the FAPs of their mouths.
+    Expressions are chosen by matching pursuit, with intensities by non-negative least squares in
+    millimetres of the face; each peak becomes an entry. A movement that expressions do not explain becomes
+    keyframes, and so do head rotations and visemes, the latter as the FAPs of their mouths.
 
     Raises:
         RealizerError: no FAP file, or one without frames or of more than five minutes.
@@ -62,39 +64,39 @@ def fap_entries(
     if coded.visemes[:, :3].any():
         notes.append("FAP 1: visemes are kept as the FAPs of their mouths")
     slow = clip.resampled(FPS)
-    shown = faps_of(np.stack([au_row(one.aus) for one in library])) * clip.mask
-    faces, shown = (features(Recording("", faps=faps)) for faps in (slow.values.astype(np.float64), shown))
-    chosen, weights = explain(faces, shown, MOST, WORTH)
-    rest, whole = (np.sum(rows**2, axis=1) for rows in (faces - weights @ shown[chosen], faces))
-    kept, columns = list[tuple[float, Entry]](), range(68)
+    shapes = faps_of(np.stack([au_row(one.aus) for one in library])) * clip.mask
+    faces, shapes = (features(Recording("", faps=faps)) for faps in (slow.values.astype(np.float64), shapes))
+    chosen, weights = explain(faces, shapes, MOST, LEAST_GAIN)
+    residual, total = (np.sum(rows**2, axis=1) for rows in (faces - weights @ shapes[chosen], faces))
+    keyframes, columns = list[tuple[float, Entry]](), range(68)
     for first, last in runs(np.any(clip.values, axis=1)):
         low, high = (round(frame / clip.fps * FPS) for frame in (first, last))
-        explained = rest[low : high + 1].sum() <= WORTH * max(whole[low : high + 1].sum(), 1e-12)
+        explained = residual[low : high + 1].sum() <= LEAST_GAIN * max(total[low : high + 1].sum(), 1e-12)
         if not explained:
             weights[low : high + 1] = 0
         if found := _keyframes(clip, first, last, columns[HEAD_COLUMNS] if explained else columns[2:]):
-            kept.append(found)
+            keyframes.append(found)
     size = 0
-    for number, (start, entry) in enumerate(kept):
+    for number, (start, entry) in enumerate(keyframes):
         size += len(entry.keys) * (len(entry.faps) + 1)
         if size > MOST_NUMBERS:
             notes.append(f"keyframes from {start:.1f} s on: more than {MOST_NUMBERS} numbers")
-            del kept[number:]
+            del keyframes[number:]
             break
     entries = [
         found for k, row in zip(chosen, weights.T, strict=True) for found in _entries(library[k].name, row)
     ]
-    return entries, kept, notes
+    return entries, keyframes, notes
 
 
 def _keyframes(clip: FAPClip, first: int, last: int, columns: Iterable[int]) -> tuple[float, Entry] | None:
-    """Return the frames of a run, and the frame of rest on each side of it; None: these FAPs rest."""
+    """Return the keyframes of a run with a frame of rest on each side, or None if these FAPs do not move."""
     moved = [column for column in columns if clip.values[first : last + 1, column].any()]
     if not moved:
         return None
     first, last = max(first - 1, 0), min(last + 1, len(clip.values) - 1)
     times, rows = np.arange(first, last + 1) / clip.fps, clip.values[first : last + 1, moved]
-    # Entries begin and end at whole milliseconds; there the frame at their border is held.
+    # Entries begin and end at whole milliseconds, where the first and last frames are repeated.
     begin, end = math.floor(times[0] * 1000 + 1e-6) / 1000, math.ceil(times[-1] * 1000 - 1e-6) / 1000
     times = np.round(times - begin, 9)
     end = max(end, begin + MIN_SECONDS)
@@ -114,7 +116,7 @@ def _entries(name: str, weights: Float64) -> list[tuple[float, Entry]]:
             part = weights[first + begin : first + end]
             if part.max() < LEAST:
                 continue
-            full = np.flatnonzero(part >= WHOLE * part.max())
+            full = np.flatnonzero(part >= REACHED * part.max())
             onset, offset = (max(float(n) / FPS, MIN_SECONDS) for n in (full[0] + 1, len(part) - full[-1]))
             length = max((len(part) + 1) / FPS, onset + offset)
             intensity = round(min(float(part.max()), 1.0), 2)
@@ -124,7 +126,7 @@ def _entries(name: str, weights: Float64) -> list[tuple[float, Entry]]:
 
 
 def _peaks(weights: Float64) -> list[tuple[int, int]]:
-    """Return first frame and end of each peak, cut at the valleys between them."""
+    """Return first frame and end of each peak, separated at the valleys."""
     cuts, top, low = [0], 0.0, 0  # the height of the peak so far, and its lowest frame since
     for k, weight in enumerate(weights.tolist()):
         if weights[low] < VALLEY * min(top, weight):

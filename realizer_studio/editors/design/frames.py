@@ -1,4 +1,4 @@
-"""Frames of a timeline and of an expression as vertices, for the head of the page."""
+"""Vertices of timelines and expressions, for the head of the page."""
 
 import io
 import tempfile
@@ -46,7 +46,7 @@ def document(name: str = FILE) -> str:
 
 
 def timeline_frames(request: Mapping[str, Any], timeline: Timeline, settings: Settings) -> dict[str, Any]:
-    """Return vertices at k / 25 s from frame `first` on, `count` of them, as int16 in base64.
+    """Return the vertices of `count` frames, 25 a second, from frame `first`, as int16 in base64.
 
     The face is `face` of the request, without idle motion; scale and offset are those of the stream `mesh`.
     """
@@ -61,29 +61,31 @@ def timeline_frames(request: Mapping[str, Any], timeline: Timeline, settings: Se
 
 
 def expression_frame(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
-    """Return vertices of action units, {"12L": 0..1}, and as `seen` what co-occurrence leaves of them."""
-    wanted = {name: value for name, value in dict(request["aus"]).items() if value}
+    """Return the vertices of action units, {"12L": 0..1}, and as `seen` the units after co-occurrence."""
+    intensities = {name: value for name, value in dict(request["aus"]).items() if value}
     options = _options(request, settings)
-    channels = _held(read_aus(wanted, "aus") if wanted else {})
+    channels = _constant_channels(read_aus(intensities, "aus") if intensities else {})
     frames = blend(channels, np.array([0.5]), Player(options).rules)
-    seen = {
+    blended = {
         name: round(float(value), 3)
         for name, value in zip(AU_NAMES(), frames.moving[:, 0], strict=True)
         if value
     }
-    asked = {channel.target.name: round(float(channel.values[0]), 3) for channel in channels}
-    return {"first": 0, "seen": seen, "asked": asked, **_vertices(frames, options)}
+    requested = {channel.target.name: round(float(channel.values[0]), 3) for channel in channels}
+    return {"first": 0, "seen": blended, "asked": requested, **_vertices(frames, options)}
 
 
 def sheet(face: str, settings: Settings) -> bytes:
-    """Return pictures of all expressions of the library in its order, 8 side by side, as WebP."""
+    """Return a contact sheet of the library's expressions, 8 in a row, as WebP."""
     from PIL import Image
 
     from realizer.render.renderer import Renderer
 
     options = replace(settings.play_options(), face=face)
-    shown = list(library_of(settings.library_folder).values())
-    rows = [blend(_held(expression.aus), np.array([0.5])).values[0] for expression in shown]
+    expressions = list(library_of(settings.library_folder).values())
+    rows = [
+        blend(_constant_channels(expression.aus), np.array([0.5])).values[0] for expression in expressions
+    ]
     frames = AUFrames(np.arange(len(rows), dtype=np.float64), np.stack(rows))
     columns = poses(
         frames, input_names(face, deformer=options.deformer), mapping_of(options.face, options.mapping)
@@ -92,15 +94,17 @@ def sheet(face: str, settings: Settings) -> bytes:
         pictures = renderer.draw(columns)[:, PICTURE - THUMB - 8 : PICTURE - 8, (PICTURE - THUMB) // 2 :][
             :, :, :THUMB
         ]
-    whole = Image.new("RGB", (COLUMNS * THUMB, -(-len(pictures) // COLUMNS) * THUMB))
+    contact_sheet = Image.new("RGB", (COLUMNS * THUMB, -(-len(pictures) // COLUMNS) * THUMB))
     for k, picture in enumerate(pictures):
-        whole.paste(Image.fromarray(picture[..., :3].copy()), (k % COLUMNS * THUMB, k // COLUMNS * THUMB))
+        contact_sheet.paste(
+            Image.fromarray(picture[..., :3].copy()), (k % COLUMNS * THUMB, k // COLUMNS * THUMB)
+        )
     file = io.BytesIO()
-    whole.save(file, "webp", quality=80)
+    contact_sheet.save(file, "webp", quality=80)
     return file.getvalue()
 
 
-def _held(aus: Mapping[tuple[int, str], float]) -> Sequence[Channel]:
+def _constant_channels(aus: Mapping[tuple[int, str], float]) -> Sequence[Channel]:
     return [
         Channel(target, np.array([0.0, 1.0]), np.array([value, value]))
         for target, value in pose_channels.columns(aus, 1.0).items()
@@ -116,7 +120,7 @@ def _options(request: Mapping[str, Any], settings: Settings) -> PlayOptions:
 
 @lru_cache(maxsize=8)
 def _player(content: str, options: PlayOptions, edition: int) -> Player:
-    """Return a player that plays a timeline from 0 s, by an edition of the library."""
+    """Return a player with a timeline that starts at 0 s, for an edition of the library."""
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, FILE).write_text(content, "utf-8")
         player = Player(

@@ -1,4 +1,4 @@
-"""Requests of the designer: each is a JSON object with the name of a tool, answered by JSON."""
+"""The answers to the tab Design: JSON requests with the name of a tool."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class Designer:
 
     Args:
         settings: of the service.
-        may_save: whether this page may save; the tab itself saves by messages of its session.
+        may_save: whether this page may save; unused, because the tab saves by messages of its session.
     """
 
     def __init__(self, settings: Settings, may_save: bool) -> None:
         self._settings = settings
 
     def answer(self, message: str | bytes) -> str:
-        """Return the answer to a request as JSON; {"id", "error": text} if there is none.
+        """Return the answer to a request as JSON, or {"id", "error": text}.
 
         Args:
             message: {"id": number, "tool": a key of `TOOLS`, ...}.
@@ -57,18 +57,18 @@ class Designer:
             found = {"id": number, **tool(request, self._settings)}
             return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
         except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
-            words = error.args[0] if isinstance(error, KeyError) and error.args else error
-            return json.dumps({"id": number, "error": str(words)})
+            text = error.args[0] if isinstance(error, KeyError) and error.args else error
+            return json.dumps({"id": number, "error": str(text)})
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: there are no resources."""
 
 
 def timeline_of(request: Mapping[str, Any], settings: Settings) -> Timeline:
-    """Return the timeline of a request, without faults.
+    """Return the timeline of a request.
 
     Raises:
-        TableError: it has faults, a line for each.
+        TableError: the timeline has faults; the message has a line for each.
     """
     timeline = read_timeline(json.dumps(request.get("timeline")).encode())
     if faults := faults_of(timeline, library_of(settings.library_folder)):
@@ -77,26 +77,26 @@ def timeline_of(request: Mapping[str, Any], settings: Settings) -> Timeline:
 
 
 def _library(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
-    """Return the expressions, all or those that match `find`: words, or action units such as "1+2+12L"."""
+    """Return all expressions, or those that match `find`: words, or action units such as "1+2+12L"."""
     from realizer.tables.knowledge import knowledge
     from realizer.tables.lexemes import read_aus
     from realizer_studio.analysis.expression_search import by_action_units, by_meaning
 
     library = library_of(settings.library_folder)
-    known = list(library.values())
+    expressions = list(library.values())
     query = str(request.get("find", "")).strip()
     parts = query.upper().replace("AU", " ").replace(",", " ").replace("+", " ").split()
     if parts and all(part.rstrip("LR").isdigit() for part in parts):
         units = read_aus(dict.fromkeys(parts, 1.0), "find")
-        known = [match for match, _ in by_action_units(units, known)]
+        expressions = [match for match, _ in by_action_units(units, expressions)]
     elif query:
-        known = [match for match, _ in by_meaning(query, known)]
+        expressions = [match for match, _ in by_meaning(query, expressions)]
     moods = sorted({mood.like for mood in knowledge().moods.values()})
-    return {"expressions": [_row(expression) for expression in known], "moods": moods}
+    return {"expressions": [_row(expression) for expression in expressions], "moods": moods}
 
 
 def _row(expression: Expression) -> dict[str, Any]:
-    """Return an expression for the page, with the version of its file but not the path."""
+    """Return an expression for the page, with the version of its file but without the path."""
     row = expression.to_json()
     file = expression.file
     row |= {name: row[name]["seconds"] for name in ("onset", "apex", "offset")}
@@ -109,7 +109,7 @@ def _row(expression: Expression) -> dict[str, Any]:
 
 
 def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
-    """Return what is unusual about a timeline, the expressions it lacks, and its duration."""
+    """Return advice about a timeline, missing expressions, and its duration."""
     from itertools import islice
 
     from realizer.checking.timeline_advice import missing_companions, timeline_advice
@@ -117,7 +117,7 @@ def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
 
     library = library_of(settings.library_folder)
     timeline = _distinct(timeline_of(request, settings))
-    places = {span.place: (span.track, span.entry) for span in visible_spans(timeline, library)}
+    positions = {span.place: (span.track, span.entry) for span in visible_spans(timeline, library)}
     role: Role = "listener" if request.get("role") == "listener" else "speaker"
     advice = islice(timeline_advice(timeline, library, role, mood_of(request)), 200)
     return {
@@ -127,7 +127,7 @@ def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
         ],
         "advice": [
             {
-                "place": places.get(one.id),
+                "place": positions.get(one.id),
                 "text": one.text,
                 "hint": one.hint.replace(
                     "`realizer enrich` adds what is missing", "the dashed block adds it"
@@ -142,7 +142,7 @@ def _check(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
 
 
 def _distinct(timeline: Timeline) -> Timeline:
-    """Return a timeline whose channels have names of their own, by which advice finds them."""
+    """Return a timeline with unique names of tracks, to which advice refers."""
     names = Counter(track.name for track in timeline.tracks)
     tracks = (
         track if names[track.name] == 1 else replace(track, name=f"{track.name} ({number})")
@@ -152,7 +152,7 @@ def _distinct(timeline: Timeline) -> Timeline:
 
 
 def mood_of(request: Mapping[str, Any]) -> Mood | None:
-    """Return the mood that a request names; raises KeyError."""
+    """Return the mood of a request, or None; raises KeyError for an unknown name."""
     from realizer.tables.knowledge import knowledge
 
     return knowledge().mood(str(request["mood"])) if request.get("mood") else None
@@ -187,12 +187,12 @@ def _export(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
 
 
 def _sound(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
-    """Return what is said as int16 in base64, and its rate in Hz."""
+    """Return the sound of speeches as int16 in base64, and its rate in Hz."""
     from realizer.outputs.wav import RATE
     from realizer_studio.editors.design.documents import sound
 
-    heard = sound(_says(request), settings).astype("<i2").tobytes()
-    return {"rate": RATE, "data": b64encode(heard).decode()}
+    samples = sound(_says(request), settings).astype("<i2").tobytes()
+    return {"rate": RATE, "data": b64encode(samples).decode()}
 
 
 def _says(request: Mapping[str, Any]) -> list[tuple[float, str]]:
@@ -213,7 +213,7 @@ def _pictures(request: Mapping[str, Any], settings: Settings) -> dict[str, Any]:
 
 @lru_cache(8)
 def _sheet(face: str, settings: Settings, edition: int) -> Future[bytes]:
-    """Begin to draw the expressions of an edition of the library, which takes seconds."""
+    """Begin to draw the expressions of an edition of the library, in another thread."""
     from realizer_studio.editors.design.frames import sheet
 
     return _drawing.submit(sheet, face, settings)

@@ -1,4 +1,4 @@
-"""What the page gets of a head: mesh, feature points, zones, and the tables that they need."""
+"""The message with a head for the page: mesh, feature points, zones, and tables."""
 
 import re
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from realizer_studio.faces.mpeg4.landmarks import PUPILS, TEETH, template
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup, setup_table
 from realizer_studio.faces.mpeg4.zones import Setup, mirrorable
 
-FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # what a face's name has not
+FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # characters that are not allowed in a face's name
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     setup = mirrorable(default_setup(at, face.triangles, points, parts["skin"]), at[slice(*parts["skin"])])
     table, by = setup_table(setup), []
     if (folder / FILE).is_file():
-        # Zones that the face has, and for its other FAPs the usual ones, which do not move it yet.
+        # The zones of the face, and default zones, not applied yet, for its other FAPs.
         by = sorted(read_setup(folder / FILE).zones)
-        mine = setup_table(setup_of(folder))
-        zones = {zone["fap"]: zone for zone in (*table["zone"], *mine["zone"])}
-        table |= {**mine, "zone": list(zones.values()), "masks": table["masks"] | mine["masks"]}
+        own_table = setup_table(setup_of(folder))
+        zones = {zone["fap"]: zone for zone in (*table["zone"], *own_table["zone"])}
+        table |= {**own_table, "zone": list(zones.values()), "masks": table["masks"] | own_table["masks"]}
     head = {
         "type": "head",
         "name": face.name,
@@ -58,14 +58,15 @@ def head_message(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         "points": points,
         "setup": {**table, "points": points},
         "by": by,
-        "keep": set(by) < set(setup.zones),  # something else moves FAPs that have no zone of their own
+        "keep": set(by) < set(setup.zones),  # whether FAPs without zones have other fields
         "fapu": {unit: face.fapu.metres(unit) for unit in ("MNS", "MW", "ENS", "ES", "IRISD")},
         **_tables(),
     }
-    vertex, near, share = bind_to_skin(at, parts)
+    vertex, nearest, weight = bind_to_skin(at, parts)
     arrays = {
         "vertices": face.vertices, "triangles": face.triangles.astype(np.uint32),
-        "grown": vertex.astype(np.uint32), "near": near.astype(np.uint32) + parts["skin"][0], "share": share,
+        "grown": vertex.astype(np.uint32), "near": nearest.astype(np.uint32) + parts["skin"][0],
+        "share": weight,
     }  # fmt: skip
     head["eyes"] = [
         {
@@ -91,32 +92,38 @@ def _tables() -> dict[str, Any]:
         }
         for row in faps()[2:]
     ]  # fmt: skip
-    marks = {name: place.round(4).tolist() for name, place in template()[0].items()}
-    says = {row.name: row.says for row in csv_rows("point_names.csv", _PointName, __package__)}
+    template_points = {name: place.round(4).tolist() for name, place in template()[0].items()}
+    descriptions = {row.name: row.says for row in csv_rows("point_names.csv", _PointName, __package__)}
     links = [[pair.one, pair.other] for pair in pairs()]
     names = {row.au: row.name for row in action_units()}
     displaced = [[unit.au, names[unit.au]] for unit in units().values() if unit.kind == "displacement"]
-    return {"faps": rows, "pairs": links, "template": marks, "says": says, "units": displaced}
+    return {
+        "faps": rows,
+        "pairs": links,
+        "template": template_points,
+        "says": descriptions,
+        "units": displaced,
+    }
 
 
-def placed_points(folder: Path, places: Mapping[str, Any]) -> dict[str, Point]:
-    """Return the feature points at their new places, each with the nearest vertex of its part."""
+def placed_points(folder: Path, positions: Mapping[str, Any]) -> dict[str, Point]:
+    """Return the feature points at new positions, each with the nearest vertex of its part."""
     parts = read_head(folder)["parts"]
     at = np.asarray(read_arrays(folder / "mesh.npz", MESH)["vertices"], np.float64)
     out = read_features(folder / "features.csv")
-    for name, place in places.items():
+    for name, position in positions.items():
         if name not in NAMES:
             raise FaceError(f"points: wanted feature points such as 2.1, got {name[:40]!r}")
-        if np.abs(np.array(place) - out[name].place).max() < 1e-7:
+        if np.abs(np.array(position) - out[name].place).max() < 1e-7:
             continue
         part = PUPILS.get(name) or TEETH.get(name, ("skin",))[0]
         part = "tongue" if name.startswith("6.") else part
         first, last = parts.get(part, parts["skin"])
-        out[name] = Point(name, nearest_vertex(at, place, (first, last)), *place)
+        out[name] = Point(name, nearest_vertex(at, position, (first, last)), *position)
     return out
 
 
 def is_here(setup: Setup, points: Mapping[str, Any]) -> bool:
-    """Return whether the points of a file are those of the head: then its numbers stay as they are."""
+    """Return whether the points of a file are those of the head, so that its zones need no conversion."""
     shared = set(setup.points) & set(points)
     return bool(shared) and all(np.allclose(setup.points[k], points[k], atol=2e-6) for k in shared)

@@ -1,4 +1,4 @@
-"""The action units of the head in the Face tab: markers, and models fitted to markers that were moved."""
+"""The action units of the head in the tab Face: markers, and models fitted to edited markers."""
 
 import json
 import math
@@ -32,11 +32,11 @@ from realizer_studio.faces.au.measure import COLLAR, OPEN, UnitMeasurement, read
 
 SHAPES = "au_shapes.npz"
 FILES = ("au_published.toml", MODEL, SHAPES, "au_to_fap.csv", "au_to_fap.txt")  # of a face's action units
-MARKERS, FEWEST, MOST = 24, 8, 200  # markers: of a unit that was not edited; of any
-MOVED = 0.08  # of d_max; markers begin where a unit moves more
-REACH = 0.02  # m around a marker in which measured places follow it, as units.js
+MARKERS, FEWEST, MOST = 24, 8, 200  # markers of an unedited unit; least and most of any unit
+MOVED = 0.08  # of d_max; least displacement of a marker's point
+REACH = 0.02  # m around a marker in which measured points follow it, as in units.js
 PIN = 1.0 / REACH**2
-FAR = 0.06  # m; no marker goes further
+FAR = 0.06  # m; largest displacement of a marker
 
 Markers = Sequence[Sequence[float]]
 
@@ -44,12 +44,12 @@ Markers = Sequence[Sequence[float]]
 class UnitFits:
     """The action units of one head.
 
-    Markers are rows of six numbers in metres: a place on the left half of the neutral face, and how far it
-    goes with full intensity. They correct what was measured: the face's own shapes, or, where it has none,
-    what FAPs make of the unit.
+    Markers are rows of six numbers in metres: a point on the left half of the neutral face, and its
+    displacement at full intensity. They correct the measurement, which is from the face's shapes or,
+    without shapes, from the unit's FAPs.
 
     Args:
-        folder: of the face; face: loaded from it, moved by FAPs alone.
+        folder: of the face; face: loaded from it, with the deformer of FAPs.
     """
 
     def __init__(self, folder: Path, face: Face) -> None:
@@ -60,13 +60,13 @@ class UnitFits:
         self._model = read_model(folder / MODEL) if (folder / MODEL).is_file() else None
 
     def unit(self, au: Any, markers: Any = None) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return markers, errors and the field of an action unit, refitted to markers if there are any.
+        """Return markers, errors and the field of an action unit, fitted to markers if given.
 
         Returns:
-            the header of the answer; `field`: (n_vertices, 3) float32 metres with full intensity.
+            the header of the answer; `field`: (n_vertices, 3) float32 metres at full intensity.
 
         Raises:
-            FaceError: no such displacement unit, or markers that nothing can be fitted to.
+            FaceError: no such displacement unit, or invalid markers.
         """
         au = _number(au)
         strength = _strength(au)
@@ -77,10 +77,10 @@ class UnitFits:
         names = side_names(au)
         field = displacements(self._face, model, names).sum(axis=0) * strength
         row = table(model, {au: one})[0]
-        shown = _sample(one) if markers is None else np.array(markers)
+        sample = _sample(one) if markers is None else np.array(markers)
         header = {
             "au": au,
-            "markers": (shown * np.r_[1, 1, 1, [1 if markers else strength] * 3]).round(6).tolist(),
+            "markers": (sample * np.r_[1, 1, 1, [1 if markers else strength] * 3]).round(6).tolist(),
             "errors": {key: round(getattr(row, key), 7) for key in ("n", "d", "d_max", "e", "e_max")},
             "table": table_text((row,)),
             "jaw": [*model.jaw, math.radians(model.units[au].jaw_degrees) * strength],
@@ -89,7 +89,7 @@ class UnitFits:
         return header, {"field": field.astype(np.float32)}
 
     def fitted(self, au: int, markers: Markers | None) -> dict[str, Model]:
-        """Return models of the unit alone, file -> model; each fit is kept.
+        """Return the models of a unit by file; fits are cached.
 
         Raises:
             FaceError: as `unit`, or the fit would tear the face.
@@ -118,8 +118,8 @@ class UnitFits:
             base = read_model(path) if path.is_file() else replace(next(iter(new.values())), units={})
             found = {**base.units, **{au: model.units[au] for au, model in new.items()}}
             write_model(path, replace(base, units=dict(sorted(found.items()))))
-        mine = {int(au): self._measurement(int(au), markers) for au, markers in edited.items()}
-        write_shapes(folder / SHAPES, dict(sorted((self._measured | mine).items())))
+        edited_measurements = {int(au): self._measurement(int(au), markers) for au, markers in edited.items()}
+        write_shapes(folder / SHAPES, dict(sorted((self._measured | edited_measurements).items())))
 
     def _measurement(self, au: int, markers: Markers | None = None) -> UnitMeasurement:
         if au not in self._measured:
@@ -131,65 +131,65 @@ class UnitFits:
 
     @cached_property
     def _skin(self) -> tuple[Any, Float64]:
-        """Return the vertices of the left half of the skin, and the share of each in the upper half."""
+        """The vertices of the left half of the skin, and their shares in the upper half."""
         first, last = self._face.parts["skin"]
         at = self._face.vertices[first:last]
-        mine = np.flatnonzero((at[:, 0] > -1e-6) & (at[:, 1] > COLLAR)) + first
-        return mine, shares(self._face, fit_mouth(self._face))[mine]
+        vertices = np.flatnonzero((at[:, 0] > -1e-6) & (at[:, 1] > COLLAR)) + first
+        return vertices, shares(self._face, fit_mouth(self._face))[vertices]
 
 
 def _number(au: Any) -> int:
     """Return the number of a displacement unit, checked."""
-    known = {str(unit.au): unit.au for unit in units().values() if unit.kind == "displacement"}
-    if str(au) not in known:
-        raise FaceError(f"au: wanted one of {', '.join(known)}, got {str(au)[:40]!r}")
-    return known[str(au)]
+    numbers = {str(unit.au): unit.au for unit in units().values() if unit.kind == "displacement"}
+    if str(au) not in numbers:
+        raise FaceError(f"au: wanted one of {', '.join(numbers)}, got {str(au)[:40]!r}")
+    return numbers[str(au)]
 
 
 def _strength(au: int) -> float:
     return next(row.strength for row in action_units() if row.au == au)
 
 
-def _by_faps(face: Face, folder: Path, au: int, mine: Any, upper: Float64) -> UnitMeasurement:
-    """Return what the FAPs of a unit move, as the face has no shape of it."""
+def _by_faps(face: Face, folder: Path, au: int, vertices: Any, upper: Float64) -> UnitMeasurement:
+    """Return the measurement of a unit's displacement by its FAPs, for a face without a shape of it."""
     values = np.zeros((1, len(axis())), np.float32)
     for one, side in side_names(au):
         values[0, axis()[f"{one}{side}"].column] = 1
     faps = to_fap(AUFrames(np.zeros(1), values), mapping_of(str(folder))).values
-    moves = (deform(face, faps)[0] - face.vertices)[mine].astype(np.float64) / _strength(au)
+    moves = (deform(face, faps)[0] - face.vertices)[vertices].astype(np.float64) / _strength(au)
     if np.abs(moves).max() < 1e-5:
         raise FaceError(
             f"AU{au}: wanted FAPs that move the skin, as this face has no shape of the unit; got none"
         )
-    at = face.vertices[mine].astype(np.float64)
-    return UnitMeasurement(au, at, moves, face.occlusion[mine] > OPEN, upper)
+    at = face.vertices[vertices].astype(np.float64)
+    return UnitMeasurement(au, at, moves, face.occlusion[vertices] > OPEN, upper)
 
 
 def _sample(one: UnitMeasurement) -> Float64:
-    """Return markers (n, 6), far from each other, on the places that one sees move."""
-    long = np.linalg.norm(one.moves, axis=1)
-    size = float(long[one.visible].max(initial=0))
-    free = np.flatnonzero(one.visible & (long > MOVED * size))
+    """Return markers (n, 6), spread over the visible points that move."""
+    lengths = np.linalg.norm(one.moves, axis=1)
+    size = float(lengths[one.visible].max(initial=0))
+    free = np.flatnonzero(one.visible & (lengths > MOVED * size))
     if len(free) < FEWEST:
-        free = np.flatnonzero(one.visible & (long > MOVES * size))
-    chosen = [int(free[np.argmax(long[free])])]
-    away = np.full(len(free), np.inf)
+        free = np.flatnonzero(one.visible & (lengths > MOVES * size))
+    chosen = [int(free[np.argmax(lengths[free])])]
+    distance = np.full(len(free), np.inf)
     while len(chosen) < min(MARKERS, len(free)):
-        away = np.minimum(away, np.linalg.norm(one.at[free] - one.at[chosen[-1]], axis=1))
-        chosen.append(int(free[np.argmax(away)]))
+        distance = np.minimum(distance, np.linalg.norm(one.at[free] - one.at[chosen[-1]], axis=1))
+        chosen.append(int(free[np.argmax(distance)]))
     return np.concatenate([one.at[chosen], one.moves[chosen]], axis=1)
 
 
 def _correction(one: UnitMeasurement, markers: Float64) -> Float64:
-    """Return how far markers change measured moves (n, 3): by distance, all of it at the marker itself."""
+    """Return the corrections (n, 3) by markers: complete at a marker, falling with distance."""
     strength = _strength(one.au)
     weight, total = np.full(len(one.at), PIN), np.zeros(one.at.shape)
     for row in markers:
-        away = np.linalg.norm(one.at - row[:3], axis=1)
-        mine = (np.maximum(REACH - away, 0) / (REACH * np.maximum(away, 1e-6))) ** 2
-        change = row[3:] / strength - one.moves[int(np.argmin(away))]
-        weight += mine
-        total += mine[:, None] * np.where(np.abs(change) < 2e-6, 0, change)
+        distance = np.linalg.norm(one.at - row[:3], axis=1)
+        share = (np.maximum(REACH - distance, 0) / (REACH * np.maximum(distance, 1e-6))) ** 2
+        change = row[3:] / strength - one.moves[int(np.argmin(distance))]
+        weight += share
+        total += share[:, None] * np.where(np.abs(change) < 2e-6, 0, change)
     return np.asarray(total / weight[:, None])
 
 

@@ -1,4 +1,4 @@
-"""One atlas of the textures of an imported head's materials, as maps of a face."""
+"""The texture atlas of an imported head: the maps of a face from the textures of its materials."""
 
 import io
 from collections.abc import Mapping, Sequence
@@ -15,16 +15,16 @@ from realizer_studio.faces.arkit.gltf import Gltf
 from realizer_studio.faces.arkit.materials import CLAMP, MIRROR, Material
 from realizer_studio.faces.arkit.mesh_merge import Surface
 
-# Larger sources are shrunk: a head fills a picture of a thousand pixels with fewer texels than that, and a
-# face of 4096 x 4096 texels takes four times the memory of graphics cards and of the page's first picture.
+# Larger sources are reduced: a head in a picture of a thousand pixels needs fewer texels than that, and
+# maps of 4096 x 4096 texels take four times the memory and time of loading.
 SIZE = 2048
-PAD = 8  # texels beyond the edges of each patch, for mean values of neighbours
-NEUTRAL = 16  # texels of the square at the top left that changes nothing
+PAD = 8  # texels of padding around each patch, for filtering
+NEUTRAL = 16  # texels of the neutral square at the top left
 LEAST = 8  # texels of a patch of one colour
-SHRINK = 0.94  # step by which patches become smaller until all have room
+SHRINK = 0.94  # factor by which patches are reduced until all fit
 COARSEST = 0.01  # of the size of the sources
 LARGEST = 8192  # texels of a source that are read along one axis
-# How fine a part's textures are in relation to those of the skin if there is no room for all of them.
+# The resolution of a part's textures relative to the skin's, if not all fit.
 FINENESS = {"hair": 0.7, "beard": 0.7, "upper_teeth": 0.7, "lower_teeth": 0.7, "shirt": 0.4, "other": 0.4}
 QUALITY = {"albedo": 92, "normal": 95, "surface": 92}  # of WebP: 1 to 4 MB together
 
@@ -45,7 +45,7 @@ class _Patch:
     rows: Any  # triangles
     uv: Float64  # of their corners, moved to one copy of a repeating texture
     low: Float64  # the least u and v
-    span: Float64  # how far they go
+    span: Float64  # their ranges
     texels: Float64  # width and height in the source
     fineness: float
 
@@ -60,13 +60,13 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
 
     if not any(surface.materials[k].textures for k in np.unique(surface.material)):
         return None
-    # Materials that differ by name and roughness alone share a patch.
-    looks: dict[Material, list[int]] = {}
+    # Materials that differ only by name and roughness share a patch.
+    materials: dict[Material, list[int]] = {}
     for k in np.unique(surface.material).tolist():
-        looks.setdefault(replace(surface.materials[k], name="", roughness=None), []).append(k)
-    patches = [_patch(gltf, surface, look, of, ranges) for look, of in looks.items()]
-    share = 1 / min(FINENESS.values())  # all as fine as in the file
-    while (places := pack(sizes := [_size(patch, share) for patch in patches])) is None:
+        materials.setdefault(replace(surface.materials[k], name="", roughness=None), []).append(k)
+    patches = [_patch(gltf, surface, material, of, ranges) for material, of in materials.items()]
+    share = 1 / min(FINENESS.values())  # the resolution of the file
+    while (corners := pack(sizes := [_size(patch, share) for patch in patches])) is None:
         share *= SHRINK
         if share < COARSEST:
             raise FaceError(f"{gltf.path}: wanted room for {len(patches)} materials; join some of them")
@@ -79,7 +79,7 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
     free[: NEUTRAL + PAD, : NEUTRAL + PAD] = False
     uv = np.empty_like(surface.uv)
     holes = np.zeros(len(uv), bool)
-    for patch, size, (x, y) in zip(patches, sizes, places, strict=True):
+    for patch, size, (x, y) in zip(patches, sizes, corners, strict=True):
         inner = np.array(size) - 2 * PAD
         uv[patch.rows] = (np.array((x, y)) + PAD + (patch.uv - patch.low) / patch.span * inner) / SIZE
         texel = patch.span / inner
@@ -88,7 +88,7 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
             maps[name][y : y + size[1], x : x + size[0]] = picture
         free[y : y + size[1], x : x + size[0]] = False
         holes[patch.rows] = maps["albedo"][y : y + size[1], x : x + size[0], 3].min() < 250
-    # From afar neighbours are mixed: what is near has the colour of a patch, not white.
+    # Free texels get the colour of the nearest patch, because mipmaps mix neighbours.
     near = distance_transform_edt(free, return_distances=False, return_indices=True)
     maps["albedo"] = maps["albedo"][tuple(near)]
     slots = {slot for patch in patches for slot, _ in patch.material.textures}
@@ -103,10 +103,10 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
 
 
 def pack(sizes: Sequence[tuple[int, int]]) -> list[tuple[int, int]] | None:
-    """Return the left and upper corner of each patch (width, height) in the atlas, or None without room."""
+    """Return the left and upper corner of each patch (width, height) in the atlas, or None."""
     floor = np.zeros(SIZE, int)  # the first free row of each column
     floor[: NEUTRAL + PAD] = NEUTRAL + PAD
-    places: list[tuple[int, int]] = [(0, 0)] * len(sizes)
+    corners: list[tuple[int, int]] = [(0, 0)] * len(sizes)
     for k in sorted(range(len(sizes)), key=lambda k: sizes[k][::-1], reverse=True):
         width, height = sizes[k]
         if width > SIZE:
@@ -117,14 +117,14 @@ def pack(sizes: Sequence[tuple[int, int]]) -> list[tuple[int, int]] | None:
         if y + height > SIZE:
             return None
         floor[x : x + width] = y + height
-        places[k] = x, y
-    return places
+        corners[k] = x, y
+    return corners
 
 
 def _patch(
     gltf: Gltf, surface: Surface, material: Material, of: list[int], ranges: Mapping[str, tuple[int, int]]
 ) -> _Patch:
-    """Return the patch of the triangles of some materials, which look alike."""
+    """Return the patch of the triangles of equivalent materials."""
     rows = np.flatnonzero(np.isin(surface.material, of))
     uv = surface.uv[rows]
     for axis, wrap in enumerate(material.chart.wrap):
@@ -145,7 +145,7 @@ def _patch(
 
 
 def _size(patch: _Patch, share: float) -> tuple[int, int]:
-    """Return width and height of a patch in the atlas, with what is beyond its edges."""
+    """Return width and height of a patch in the atlas, including its padding."""
     scale = min(1.0, share * patch.fineness, (SIZE - 2 * PAD) / patch.texels.max())
     width, height = np.maximum(np.ceil(patch.texels * scale), LEAST) + 2 * PAD
     return int(width), int(height)
@@ -159,8 +159,8 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
     """
     textures = dict(material.textures)
 
-    def seen(slot: str, cut: Any = None) -> Any:
-        """Return the picture of a slot as 0..255, or None."""
+    def sampled(slot: str, cut: Any = None) -> Any:
+        """Return the texture of a slot as 0..255, or None."""
         texture = textures.get(slot)
         pixels = gltf.pixels(texture.image) if texture else None
         if texture is None or pixels is None:
@@ -169,8 +169,8 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
 
     factor = material.colour[3]
 
-    def holes(pixels: Any) -> Any:
-        """Cut what is below the cutoff off, or keep alpha, or ignore it."""
+    def with_alpha(pixels: Any) -> Any:
+        """Apply the material's alpha mode."""
         if material.alpha == "OPAQUE":
             return pixels[..., :3]
         if material.alpha == "MASK":
@@ -178,7 +178,7 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
             return np.concatenate([pixels[..., :3], 255 * solid.astype(np.uint8)], axis=2)
         return pixels
 
-    base = seen("base", holes)
+    base = sampled("base", with_alpha)
     albedo = np.full((size[1], size[0], 4), 255, np.float32)
     if base is not None:
         albedo[..., : base.shape[2]] = base
@@ -186,21 +186,21 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
         albedo[..., 3] *= factor
     light = linear(albedo[..., :3]) * np.array(material.colour[:3], np.float32)
     if any(material.emission):
-        glow = seen("emission")
+        glow = sampled("emission")
         light = light + (1 if glow is None else linear(glow[..., :3])) * np.array(
             material.emission, np.float32
         )
     albedo[..., :3] = srgb(light) * 255
     out = {"albedo": albedo}
-    if (normal := seen("normal")) is not None:
-        ups = normal[..., :3] / 127.5 - 1
-        ups[..., :2] *= textures["normal"].amount
-        ups /= np.maximum(np.linalg.norm(ups, axis=2, keepdims=True), 1e-6)
-        out["normal"] = 127.5 * ups + 127.5
+    if (normal := sampled("normal")) is not None:
+        normals = normal[..., :3] / 127.5 - 1
+        normals[..., :2] *= textures["normal"].amount
+        normals /= np.maximum(np.linalg.norm(normals, axis=2, keepdims=True), 1e-6)
+        out["normal"] = 127.5 * normals + 127.5
     out["surface"] = np.full((size[1], size[0], 3), 255, np.float32)
-    if (shade := seen("occlusion")) is not None:
+    if (shade := sampled("occlusion")) is not None:
         out["surface"][..., 0] -= (255 - shade[..., 0]) * textures["occlusion"].amount
-    if (rough := seen("roughness")) is not None:
+    if (rough := sampled("roughness")) is not None:
         out["surface"][..., 1] = rough[..., 1]
     return {name: np.clip(np.rint(picture), 0, 255).astype(np.uint8) for name, picture in out.items()}
 
@@ -215,15 +215,15 @@ def _resampled(pixels: Any, box: Float64, size: tuple[int, int], wrap: tuple[int
     for axis, n in enumerate((width, height)):
         count = np.ceil(high[axis]) - first[axis]
         step[axis] = max(1.0, count / LARGEST)
-        at = (first[axis] + step[axis] * np.arange(int(count / step[axis]))).astype(int)
+        index = (first[axis] + step[axis] * np.arange(int(count / step[axis]))).astype(int)
         if wrap[axis] == CLAMP:
-            at = at.clip(0, n - 1)
+            index = index.clip(0, n - 1)
         elif wrap[axis] == MIRROR:
-            at = np.where(at // n % 2 == 0, at % n, n - 1 - at % n)
-        axes.append(at % n)
+            index = np.where(index // n % 2 == 0, index % n, n - 1 - index % n)
+        axes.append(index % n)
     part = pixels[axes[1][:, None], axes[0]]
     frame = (*((low - first) / step), *((high - first) / step))
-    # Channel by channel: Pillow would blacken what is transparent.
+    # Channels are resized separately, because Pillow premultiplies by alpha.
     return np.stack(
         [
             np.asarray(Image.fromarray(part[..., k]).resize(size, Image.Resampling.BICUBIC, frame))

@@ -1,7 +1,7 @@
 """A reader of GLB and glTF 2.0 files.
 
-Our own reader: trimesh leaves morph targets out, and pygltflib returns raw bytes, so what a head
-needs (sparse, normalised and strided accessors) would have to be written anyway.
+No library is used: trimesh ignores morph targets, and pygltflib returns raw bytes without the sparse,
+normalised and strided accessors that heads need.
 """
 
 import base64
@@ -24,10 +24,10 @@ KINDS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
 MAX_NUMBERS = 2**26  # in all accessors together: a head of 24,000 vertices with 900 shapes
 MAX_PIXELS = 8192 * 8192  # of a texture
-PICTURES = 4  # that are kept in memory
+PICTURES = 4  # kept in memory
 UNPACK_KTX = "npx @gltf-transform/cli ktxdecompress HEAD.glb PLAIN.glb"
 MAX_BYTES = 2**29  # of an unpacked buffer view
-# Required extensions of others than Khronos that this reader supports; Khronos' own change how surfaces look.
+# Supported required extensions that are not by Khronos; those by Khronos change the look of surfaces.
 UNDERSTOOD = {"EXT_meshopt_compression", "EXT_texture_webp", "EXT_texture_avif"}
 
 
@@ -44,7 +44,7 @@ class Gltf:
         """Read a .glb, or a .gltf with the files beside it.
 
         Raises:
-            FaceError: no such file, a truncated or foreign one, another version, or packed geometry.
+            FaceError: no such file, a truncated or other file, another version, or packed geometry.
         """
         self.path = path
         try:
@@ -90,31 +90,31 @@ class Gltf:
         """Return one of the document's objects by its index.
 
         Raises:
-            FaceError: it is not there.
+            FaceError: there is no such object.
         """
         items = self.list(name)
         if not 0 <= index < len(items):
-            wanted = f"an index 0..{len(items) - 1}" if items else "none, as there are none"
-            raise FaceError(f"{self.path}: {name}: wanted {wanted}, got {index!r}; export the head again")
+            expected = f"an index 0..{len(items) - 1}" if items else "none, as there are none"
+            raise FaceError(f"{self.path}: {name}: wanted {expected}, got {index!r}; export the head again")
         return items[index]
 
     def put(self, index: int, values: Any) -> None:
-        """Put values (count, width) in the place of an accessor's.
+        """Replace the values (count, width) of an accessor.
 
         Raises:
-            FaceError: the accessor is not there, or has another shape.
+            FaceError: there is no such accessor, or it has another shape.
         """
         accessor = self.item("accessors", index)
-        wanted = (accessor["count"], WIDTHS[accessor["type"]])
-        if np.shape(values) != wanted:
-            raise FaceError(f"{self.path}: accessors[{index}]: wanted {wanted}, got {np.shape(values)}")
+        shape = (accessor["count"], WIDTHS[accessor["type"]])
+        if np.shape(values) != shape:
+            raise FaceError(f"{self.path}: accessors[{index}]: wanted {shape}, got {np.shape(values)}")
         self._values[index] = values
 
     def accessor(self, index: int) -> Float64:
         """Return an accessor's values, (count, width) float64; normalised ones as -1..1 or 0..1.
 
         Raises:
-            FaceError: it, its view or its bytes are not there.
+            FaceError: the accessor, its view or its bytes are missing.
         """
         accessor = self.item("accessors", index)
         where = f"accessors[{index}]"
@@ -136,8 +136,8 @@ class Gltf:
                 start = part.get("byteOffset", 0)
                 return self._strided(part["bufferView"], start, kind, sparse["count"], width, where)
 
-            places = sparse["indices"]
-            rows = stored(places, KINDS[places["componentType"]], 1).ravel()
+            targets = sparse["indices"]
+            rows = stored(targets, KINDS[targets["componentType"]], 1).ravel()
             if len(rows) and rows.max() >= count:
                 raise FaceError(f"{self.path}: {where}: sparse: wanted rows 0..{count - 1}, got {rows.max()}")
             values[rows] = stored(sparse["values"], KINDS[kind], width)
@@ -220,14 +220,14 @@ class Gltf:
                 raise FaceError(
                     f"{self.path}: wanted base64 in a data URI, got something else; export the head again"
                 ) from None
-        place = Path(unquote(uri))
-        if "://" in uri or place.is_absolute() or ".." in place.parts:
+        name = Path(unquote(uri))
+        if "://" in uri or name.is_absolute() or ".." in name.parts:
             raise FaceError(f"{self.path}: {uri}: wanted a file beside this one; export the head as one GLB")
         try:
-            return (self.path.parent / place).read_bytes()
+            return (self.path.parent / name).read_bytes()
         except (OSError, ValueError) as error:
             raise FaceError(
-                f"{self.path.parent / place}: {getattr(error, 'strerror', error)}; put it beside "
+                f"{self.path.parent / name}: {getattr(error, 'strerror', error)}; put it beside "
                 f"{self.path.name}, or export the head as one GLB"
             ) from None
 
@@ -235,7 +235,7 @@ class Gltf:
         """Return (height, width, 4) uint8 sRGB of an image; None, and a note, if it cannot be decoded.
 
         Raises:
-            FaceError: the image is missing, too large, or of a kind that has to be converted first.
+            FaceError: the image is missing, too large, or of a format that has to be converted first.
         """
         if image not in self._pictures:
             while len(self._pictures) >= PICTURES:
@@ -259,11 +259,11 @@ class Gltf:
             with Image.open(io.BytesIO(raw)) as picture:
                 if picture.width * picture.height <= MAX_PIXELS:
                     return np.asarray(picture.convert("RGBA"))
-                got = f"{picture.width} x {picture.height}"
+                size = f"{picture.width} x {picture.height}"
         except Image.DecompressionBombError:
-            got = "more"
+            size = "more"
         except (UnidentifiedImageError, OSError, SyntaxError, ValueError):  # of the decoders
             note = f"{name}: no picture that can be decoded; drawn without it"
             self.notes = (*dict.fromkeys((*self.notes, note)),)
             return None
-        raise FaceError(f"{self.path}: {name}: wanted at most 8192 x 8192 pixels, got {got}")
+        raise FaceError(f"{self.path}: {name}: wanted at most 8192 x 8192 pixels, got {size}")

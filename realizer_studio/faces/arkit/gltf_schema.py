@@ -1,4 +1,4 @@
-"""The parts of glTF 2.0 documents that heads are read from, as a schema."""
+"""The schema of the parts of glTF 2.0 documents from which heads are read."""
 
 from types import GenericAlias
 from typing import Annotated, Any, Literal
@@ -17,7 +17,7 @@ Component = Literal[5120, 5121, 5122, 5123, 5125, 5126]
 
 
 def _object(name: str, needed: str = "", **members: Any) -> Any:
-    """Return the schema of an object: the kinds of its members, of which some are needed."""
+    """Return the schema of an object with the kinds of its members; `needed` names the required ones."""
     rows = {key: (kind, ... if key in needed.split() else None) for key, kind in members.items()}
     return create_model(f"_{name}", **rows)  # type: ignore[call-overload]
 
@@ -105,18 +105,20 @@ _Document = _object(
 
 
 def document_fault(document: Any) -> str:
-    """Return the first place of a document that is not glTF, with what was wanted and what came, or ""."""
+    """Return a sentence about the first fault of a document, or "" if it is valid."""
     try:
         _Document.model_validate(document)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in first["loc"])
-        place = "".join(steps).removeprefix(".") or "document"
-        wanted = first["msg"].replace("Input should be", "wanted").replace("Field required", "wanted a value")
-        wanted = wanted.replace("List should have", "wanted").replace(" after validation", "")
+        path = "".join(steps).removeprefix(".") or "document"
+        expected = (
+            first["msg"].replace("Input should be", "wanted").replace("Field required", "wanted a value")
+        )
+        expected = expected.replace("List should have", "wanted").replace(" after validation", "")
         try:
             got = repr(first["input"])[:80]
         except ValueError:
             got = "a number of thousands of digits"
-        return f"{place}: {wanted}, got {got}"
+        return f"{path}: {expected}, got {got}"
     return ""

@@ -1,4 +1,4 @@
-"""The head in a glTF file: one surface, cut to a bust, sorted into parts."""
+"""The head in a glTF file: one surface, cut to a bust and divided into parts."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from realizer.tables.arkit_names import canonical, nearest, shapes
 from realizer_studio.faces.arkit.gltf import Gltf
 from realizer_studio.faces.arkit.mesh_merge import Surface, cut, merge_pieces
 from realizer_studio.faces.arkit.orientation import oriented, pose_of
-from realizer_studio.faces.arkit.part_classifier import ASIDE, FLOOR, ball_behind, sort_parts
+from realizer_studio.faces.arkit.part_classifier import FLOOR, HALF_WIDTH, ball_behind, sort_parts
 from realizer_studio.faces.arkit.scene import read_pieces
 from realizer_studio.faces.mpeg4.parameters import ranges
 
@@ -28,11 +28,11 @@ SURE, FAIR, GUESS = "sure", "fair", "guess"
 
 @dataclass(frozen=True)
 class FapSource:
-    """What moves a FAP."""
+    """The source of a FAP's displacement."""
 
     fap: int
-    made_by: str  # the names of shapes, or in words what else
-    sure: str  # SURE: by the head itself; FAIR: one of shape and feature point is not its own; GUESS: both
+    source: str  # the names of shapes, or a description
+    certainty: str  # SURE: shape and feature point are the head's; FAIR: one is guessed; GUESS: both are
 
 
 @dataclass(frozen=True)
@@ -47,40 +47,40 @@ def _shapes() -> dict[int, str]:
 
 
 def fap_sources(
-    made: Collection[int], guesses: Collection[str], parts: Collection[str], painted: bool
+    shape_faps: Collection[int], guesses: Collection[str], parts: Collection[str], painted: bool
 ) -> tuple[FapSource, ...]:
-    """Return what moves each FAP from 3 to 68.
+    """Return the sources of the FAPs from 3 to 68.
 
     Args:
-        made: FAPs that the head's shapes move; guesses: feature points that its shapes do not show.
-        parts: parts of the head; painted: whether the eyes are no balls of their own.
+        shape_faps: FAPs that the head's shapes move; guesses: feature points that are guessed.
+        parts: parts of the head; painted: whether the eyes are part of the skin's mesh.
     """
     out = []
     for row in faps()[2:]:
         guessed = row.feature_point in guesses
-        if row.fap in made:
-            words, sure = _shapes()[row.fap], FAIR if guessed else SURE
+        if row.fap in shape_faps:
+            source, certainty = _shapes()[row.fap], FAIR if guessed else SURE
         elif row.fap in LOOKS and painted:
-            words, sure = "eyeLook shapes", SURE
+            source, certainty = "eyeLook shapes", SURE
         elif row.fap in EYES and not painted:
-            words, sure = "a turn or push of the eyeball", SURE
+            source, certainty = "a turn or push of the eyeball", SURE
         elif row.fap in HEAD:
-            words, sure = "a turn of the head about the neck, by height", FAIR
+            source, certainty = "a turn of the head about the neck, by height", FAIR
         elif row.fap in TONGUE and "tongue" not in parts:
-            words, sure = "nothing: there is no tongue", SURE
+            source, certainty = "nothing: there is no tongue", SURE
         else:
             lacks = f" (its shapes {_shapes()[row.fap]} lack or do not fit)" if row.fap in _shapes() else ""
-            words, sure = f"a zone around its point{lacks}", GUESS if guessed else FAIR
-        out.append(FapSource(row.fap, words, sure))
+            source, certainty = f"a zone around its point{lacks}", GUESS if guessed else FAIR
+        out.append(FapSource(row.fap, source, certainty))
     return tuple(out)
 
 
 def source_table(sources: Collection[FapSource]) -> tuple[str, ...]:
-    """Return the sources as lines of a table, FAPs of the same source together."""
-    order = sorted(sources, key=lambda one: ((SURE, FAIR, GUESS).index(one.sure), one.made_by, one.fap))
+    """Return the sources as lines of a table, grouped by source."""
+    order = sorted(sources, key=lambda one: ((SURE, FAIR, GUESS).index(one.certainty), one.source, one.fap))
     cells = [("FAPs", "move by", "how sure")] + [
-        (", ".join(ranges(np.array([one.fap for one in group])).split()), made_by, sure)
-        for (sure, made_by), group in groupby(order, lambda one: (one.sure, one.made_by))
+        (", ".join(ranges(np.array([one.fap for one in group])).split()), source, certainty)
+        for (certainty, source), group in groupby(order, lambda one: (one.certainty, one.source))
     ]
     wide = [max(len(row[k]) for row in cells) for k in range(2)]
     return tuple(f"{a:<{wide[0]}}  {b:<{wide[1]}}  {c}" for a, b, c in cells)
@@ -90,10 +90,10 @@ def source_table(sources: Collection[FapSource]) -> tuple[str, ...]:
 class Report:
     """The report of an import."""
 
-    found: tuple[str, ...]  # parts and features that were recognised
-    missing: tuple[str, ...]  # those that were not, with the consequences
+    found: tuple[str, ...]  # recognised parts and features
+    missing: tuple[str, ...]  # missing ones, with the consequences
     unsure: tuple[str, ...]  # guesses to check by eye
-    faps: tuple[FapSource, ...] = ()  # what moves each FAP; empty before that is known
+    faps: tuple[FapSource, ...] = ()  # the sources of FAPs; empty until they are computed
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -104,11 +104,11 @@ class Report:
 
 @dataclass(frozen=True, eq=False)
 class Head:
-    """A head on the way from a file to a face folder."""
+    """A head that was read from a file."""
 
-    surface: Surface  # upright, in metres, its vertices part after part
+    surface: Surface  # upright, in metres, its vertices ordered by part
     ranges: dict[str, tuple[int, int]]  # part -> first, last + 1 vertex
-    painted: bool  # whether the eyes are no balls of their own
+    painted: bool  # whether the eyes are part of the skin's mesh
     gltf: Gltf
     report: Report
 
@@ -121,27 +121,29 @@ def read_head(path: Path) -> Head:
     """
     gltf = Gltf(path)
     pieces = read_pieces(gltf)
-    own = list(dict.fromkeys(name for piece in pieces for name in piece.moves))
+    morph_names = list(dict.fromkeys(name for piece in pieces for name in piece.moves))
     if not pieces:
         raise FaceError(f"{path}: wanted a head, found no triangles; export the head's meshes")
-    if not own:
+    if not morph_names:
         raise FaceError(
             f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), found none; "
             "export the head with its shape keys"
         )
-    foreign = [name for name in own if canonical(name) is None]
-    if len(foreign) == len(own):
-        guesses = [f"{name} ({' or '.join(nearest(name))}?)" if nearest(name) else name for name in own[:12]]
+    foreign = [name for name in morph_names if canonical(name) is None]
+    if len(foreign) == len(morph_names):
+        guesses = [
+            f"{name} ({' or '.join(nearest(name))}?)" if nearest(name) else name for name in morph_names[:12]
+        ]
         raise FaceError(
             f"{path}: wanted morph targets with ARKit's names (jawOpen, eyeBlinkLeft, ...), got "
-            f"{', '.join(guesses)}{' ...' if len(own) > 12 else ''}; rename them"
+            f"{', '.join(guesses)}{' ...' if len(morph_names) > 12 else ''}; rename them"
         )
     try:
         surface = merge_pieces(pieces)
         pose = pose_of(surface)
         surface = oriented(surface, pose)
         surface = cut(surface, surface.vertices[:, 1] - FLOOR)
-        surface = cut(surface, ASIDE - np.abs(surface.vertices[:, 0]))
+        surface = cut(surface, HALF_WIDTH - np.abs(surface.vertices[:, 0]))
         parts = sort_parts(surface)
     except FaceError as error:
         raise FaceError(f"{path}: {error}") from None
@@ -149,7 +151,7 @@ def read_head(path: Path) -> Head:
     fit = ball_behind if parts.painted else fit_ball
     balls = [fit(surface.vertices[slice(*ranges[part])])[0] for part in ("left_eye", "right_eye")]
     surface = replace(surface, vertices=surface.vertices - (balls[0] + balls[1]) / 2)
-    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.notes, *parts.words]
+    found = [f"{len(surface.moves)} of ARKit's {len(shapes())} shapes", *pose.notes, *parts.notes]
     notes: dict[str, dict[str, None]] = {}  # -> materials
     for piece in pieces:
         for note in piece.notes:

@@ -1,4 +1,4 @@
-"""The materials of a glTF file: factors and textures of what they look like."""
+"""The materials of a glTF file: factors and textures."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from realizer_studio.faces.arkit.gltf import Gltf
 
 REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
-DRAWN = {  # extensions of materials that the import keeps
+DRAWN = {  # extensions of materials that the import supports
     "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength",
     "KHR_materials_transmission",
 }  # fmt: skip
@@ -14,19 +14,19 @@ DRAWN = {  # extensions of materials that the import keeps
 
 @dataclass(frozen=True)
 class Chart:
-    """Where the places of a texture come from."""
+    """The texture coordinates of a texture."""
 
     name: str = ""  # the attribute, such as TEXCOORD_0
     offset: tuple[float, float] = (0, 0)  # as in KHR_texture_transform
     scale: tuple[float, float] = (1, 1)  # as in KHR_texture_transform
     rotation: float = 0  # as in KHR_texture_transform
-    # What is beyond the edges of the texture along u and v: REPEAT, CLAMP or MIRROR.
+    # Wrapping beyond the edges of the texture along u and v: REPEAT, CLAMP or MIRROR.
     wrap: tuple[int, int] = (REPEAT, REPEAT)
 
 
 @dataclass(frozen=True)
 class Texture:
-    """A picture of a file by its number, and the share of it that counts."""
+    """A texture of a file: the number of its image, its coordinates, and its strength."""
 
     image: int
     chart: Chart
@@ -35,28 +35,28 @@ class Texture:
 
 @dataclass(frozen=True)
 class Material:
-    """What a surface looks like."""
+    """The look of a surface."""
 
     name: str  # its name, or ""
     colour: tuple[float, ...]  # linear RGB and alpha
     emission: tuple[float, ...]  # linear RGB
-    roughness: float | None  # 0..1, or None if the file says nothing about it
+    roughness: float | None  # 0..1, or None if the file does not state it
     alpha: str  # OPAQUE, MASK or BLEND
-    cutoff: float  # alpha below which MASK leaves nothing
-    transmission: float  # 0..1, how much light goes through
+    cutoff: float  # alpha below which MASK is transparent
+    transmission: float  # 0..1, share of transmitted light
     textures: tuple[tuple[str, Texture], ...]  # base, normal, roughness, occlusion, emission -> texture
 
     @property
     def chart(self) -> Chart:
-        """The chart of its textures: that of the first."""
+        """The texture coordinates, which are those of the first texture."""
         return self.textures[0][1].chart if self.textures else Chart()
 
 
 def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, ...]]:
-    """Return a material of a file, and what of it will not be drawn; for None the one that glTF defines.
+    """Return a material of a file, and notes about properties that are not drawn; None for glTF's default.
 
     Raises:
-        FaceError: a texture or a sampler is not there.
+        FaceError: a texture or a sampler is missing.
     """
     found = {} if number is None else gltf.item("materials", number)
     name, more = str(found.get("name", "")), found.get("extensions", {})
@@ -68,7 +68,7 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
         "occlusion": found.get("occlusionTexture"),
         "emission": found.get("emissiveTexture"),
     }
-    notes = [f"{extension} is not drawn" for extension in more if _is_look(extension)]
+    notes = [f"{extension} is not drawn" for extension in more if _is_undrawn(extension)]
     if "KHR_materials_unlit" in more:
         notes.append("unlit in the file, here light falls on it as on all others")
     textures: dict[str, Texture] = {}
@@ -79,7 +79,7 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
                 notes.append(f"the {slot} texture has no picture that is known")
             continue
         chart = next((one.chart for one in textures.values()), texture.chart)
-        if _places(texture.chart) == _places(chart):
+        if _coordinates(texture.chart) == _coordinates(chart):
             textures[slot] = texture
         else:
             notes.append(f"the {slot} texture has other places than the first one and is left out")
@@ -97,11 +97,11 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
     return material, tuple(notes)
 
 
-def _is_look(extension: str) -> bool:
+def _is_undrawn(extension: str) -> bool:
     return extension.startswith(("KHR_materials_", "EXT_materials_")) and extension not in DRAWN
 
 
-def _places(chart: Chart) -> tuple[Any, ...]:
+def _coordinates(chart: Chart) -> tuple[Any, ...]:
     return chart.name, chart.offset, chart.scale, chart.rotation
 
 

@@ -1,4 +1,4 @@
-"""Merging of surface pieces into one mesh with ARKit's shape names, and what their names say of parts."""
+"""Merging of surface pieces into one mesh with ARKit's shape names, and naming of parts."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from realizer.tables.arkit_names import canonical
 from realizer_studio.faces.arkit.materials import Material
 from realizer_studio.faces.arkit.scene import Piece
 
-LARGEST = 1e6  # of the size of all; int64 holds the places in steps of `SAME`
-SAME = 2e-6  # of the size of all; vertices nearer than that, that move alike, are one
+LARGEST = 1e6  # times the size of the head; int64 holds such coordinates in steps of `SAME`
+SAME = 2e-6  # of the size of the head; nearer vertices that move alike are merged
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,11 +30,11 @@ class Surface:
     vertices: Float64  # (n, 3)
     triangles: Int32  # (m, 3)
     colours: Float64  # (n, 3) sRGB 0..255, of the vertices alone
-    piece: Int32  # (n,) which piece a vertex came from
+    piece: Int32  # (n,) the piece of each vertex
     names: tuple[tuple[str, str, str], ...]  # of each piece's material, mesh and node
     moves: Mapping[str, Float64]  # ARKit's name -> (n, 3), at weight 1
-    uv: Float64  # (m, 3, 2) places of the corners of triangles in the textures of their materials
-    material: Int32  # (m,) which of the materials a triangle has
+    uv: Float64  # (m, 3, 2) texture coordinates of the triangles' corners
+    material: Int32  # (m,) index of each triangle's material
     materials: tuple[Material, ...]
 
     def move(self, name: str) -> Float64:
@@ -48,7 +48,7 @@ class Surface:
         return np.asarray(np.sum([self.moves[name] for name in names], axis=0))
 
     def centre(self, moves: Iterable[Float64]) -> Float64:
-        """Return the middle (3,) of what shapes (n, 3) move."""
+        """Return the centroid (3,) of vertices, weighted by their squared displacements in shapes (n, 3)."""
         weight = np.sum([(move**2).sum(axis=1) for move in moves], axis=0)
         return np.asarray((self.vertices * weight[:, None]).sum(axis=0) / weight.sum())
 
@@ -57,7 +57,7 @@ class Surface:
         return components(half_edges(self.triangles), len(self.vertices))
 
     def painted_colours(self) -> Float64:
-        """Return the colours (n, 3) of vertices with those of their materials, without textures."""
+        """Return the colours (n, 3) of vertices multiplied by those of their materials, without textures."""
         factors = np.array([material.colour[:3] for material in self.materials], np.float32)
         share = np.ones((len(self.vertices), 3), np.float32)
         share[self.triangles] = factors[self.material][:, None]
@@ -66,9 +66,9 @@ class Surface:
     def subset(self, vertices: Any) -> Surface:
         """Return the surface of the given vertices, in their order, with the triangles between them."""
         index = np.asarray(vertices)
-        place = np.full(len(self.vertices), -1)
-        place[index] = np.arange(len(index))
-        corners = place[self.triangles]
+        new_index = np.full(len(self.vertices), -1)
+        new_index[index] = np.arange(len(index))
+        corners = new_index[self.triangles]
         keep = (corners >= 0).all(axis=1)
         return self._taken(index, corners[keep], self.uv[keep], self.material[keep])
 
@@ -89,7 +89,7 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
     """Return the pieces as one surface, without transparent pieces.
 
     Raises:
-        FaceError: all is transparent, or places or moves are not finite or far larger than the head.
+        FaceError: all pieces are transparent, or numbers are not finite or far larger than the head.
     """
     pieces = [piece for piece in pieces if not piece.glass]
     if not pieces:
@@ -98,14 +98,14 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
     total = int(counts[-1])
     moves: dict[str, Float64] = {}
     for piece, first in zip(pieces, counts, strict=False):
-        for own, move in piece.moves.items():
-            name = canonical(own)
+        for given, move in piece.moves.items():
+            name = canonical(given)
             if name is not None:
-                # Halves of one shape add up.
+                # The halves of a shape are added.
                 moves.setdefault(name, np.zeros((total, 3)))[first : first + len(move)] += move
     materials = tuple(dict.fromkeys(piece.material for piece in pieces))
     which = [materials.index(piece.material) for piece in pieces]
-    whole = Surface(
+    surface = Surface(
         vertices=np.concatenate([piece.vertices for piece in pieces]),
         triangles=np.concatenate([p.triangles + f for p, f in zip(pieces, counts, strict=False)]),
         colours=np.concatenate([piece.colours for piece in pieces]),
@@ -116,32 +116,32 @@ def merge_pieces(pieces: Sequence[Piece]) -> Surface:
         materials=materials,
         moves=moves,
     )
-    return _welded(whole)
+    return _welded(surface)
 
 
 def _welded(surface: Surface) -> Surface:
-    """Merge vertices of a part at one place that move alike: files double them along every seam of a texture.
+    """Merge vertices of a part with one position and equal displacements, which texture seams double.
 
-    Hair that is rooted in a vertex of the skin stays a part of its own.
+    Hair that is rooted in a vertex of the skin remains a separate part.
     """
     values = np.concatenate([surface.vertices, *surface.moves.values()], axis=1)
     is_finite = bool(np.isfinite(values).all())
     size = (float(np.ptp(surface.vertices, axis=0).max()) or 1.0) if is_finite else 0.0
     if not is_finite or np.abs(values).max() > LARGEST * size:
-        wanted = f"wanted finite places and moves, up to {LARGEST:g} times the size of the head"
-        raise FaceError(f"{wanted}, got NaN, infinity or more; export the head again")
+        expected = f"wanted finite places and moves, up to {LARGEST:g} times the size of the head"
+        raise FaceError(f"{expected}, got NaN, infinity or more; export the head again")
     parts = [part_of(names) or "skin" for names in surface.names]
     part = np.array([parts.index(name) for name in parts])[surface.piece]
     key = np.column_stack([part, np.rint(values / (size * SAME)).astype(np.int64)])
     _, first, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
     group = group.ravel()
     corners = group[surface.triangles]
-    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-    corners = corners[whole]
+    complete = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    corners = corners[complete]
     count = np.bincount(group)[:, None]
     colours = np.stack([np.bincount(group, surface.colours[:, k]) for k in range(3)], 1) / count
-    # Vertices without a triangle are invisible.
-    taken = surface._taken(first, corners, surface.uv[whole], surface.material[whole])
+    # Vertices without triangles are dropped.
+    taken = surface._taken(first, corners, surface.uv[complete], surface.material[complete])
     return replace(taken, colours=colours).subset(np.unique(corners))
 
 
@@ -157,7 +157,7 @@ _rules = cache(partial(csv_rows, "parts.csv", _Rule, __package__))
 def part_of(names: tuple[str, ...]) -> str:
     """Return the part that the names of a material, a mesh and a node suggest, or "".
 
-    A name that says skin is a last resort: whole heads are called so, with all that is in them.
+    Names for skin are used last, because whole heads, with all their parts, have such names.
     """
     weak = ""
     for name in names:
@@ -179,7 +179,7 @@ def cut(surface: Surface, height: Float64) -> Surface:
     n = len(surface.vertices)
     flat = Submesh(sp.csr_matrix(sp.eye_array(n)), np.zeros((n, 3)), surface.triangles)
     piece, mix = flat.clipped(height)
-    # Triangles are cut in their order, into two where two of their corners stay.
+    # `clipped` keeps the order of triangles, and makes two of a triangle with two corners inside.
     inside = (height > -SLIVER)[surface.triangles].sum(axis=1)
     of = np.repeat(np.arange(len(inside)), np.array([0, 1, 2, 1])[inside])
     corners = np.repeat(surface.triangles[of], 3, axis=0)

@@ -1,4 +1,4 @@
-"""A decoder of buffer views that are packed by meshopt.
+"""A decoder of buffer views compressed by meshopt.
 
 Source: the text of the glTF extensions EXT_ and KHR_meshopt_compression, appendices A and B.
 """
@@ -18,7 +18,7 @@ WRAP = 0xFFFFFFFF
 WIDTHS = {0xA0: ((0, 2, 4, 8),), 0xA1: ((0, 1, 2, 4), (1, 2, 4, 8))}
 TAILS = {0xA0: 32, 0xA1: 24}  # least bytes of a tail
 TRIANGLES, INDICES = 0xE1, 0xD1  # header bytes of the other modes
-# Width -> the small numbers in each byte; those of one bit begin at the lowest bit, others at the highest.
+# Width -> the numbers packed in each byte; those of one bit begin at the lowest bit, others at the highest.
 SMALL = {
     width: [
         bytes(byte >> (k * width if width == 1 else 8 - width - k * width) & (1 << width) - 1
@@ -82,7 +82,7 @@ def _attributes(data: bytes, count: int, stride: int) -> Any:
 
 
 def _row(data: bytes, at: int, size: int, widths: Any, literal: bool) -> tuple[bytes, int]:
-    """Return the deltas of one byte of the elements of a block, and the place after them."""
+    """Return the deltas of one byte of the elements of a block, and the offset after them."""
     groups = -(-size // GROUP)
     if widths is None:
         end = at + size if literal else at
@@ -97,10 +97,10 @@ def _row(data: bytes, at: int, size: int, widths: Any, literal: bool) -> tuple[b
         elif width:
             small = bytearray(b"".join([SMALL[width][byte] for byte in data[at : at + 2 * width]]))
             at, outside = at + 2 * width, (1 << width) - 1
-            place = small.find(outside)
-            while place >= 0:
-                small[place] = data[at]
-                at, place = at + 1, small.find(outside, place + 1)
+            position = small.find(outside)
+            while position >= 0:
+                small[position] = data[at]
+                at, position = at + 1, small.find(outside, position + 1)
             out.append(bytes(small))
         else:
             out.append(bytes(GROUP))
@@ -112,14 +112,14 @@ def _summed(deltas: Any, base: Any, mode: int) -> Any:
     kind, turn = mode & 15, mode >> 4
     if kind > 2 or (turn and kind < 2):
         raise KeyError(f"channel mode {mode}")
-    whole = np.ascontiguousarray(deltas).view(("u1", "<u2", "<u4")[kind])
-    first = np.ascontiguousarray(base).view(whole.dtype)
+    words = np.ascontiguousarray(deltas).view(("u1", "<u2", "<u4")[kind])
+    first = np.ascontiguousarray(base).view(words.dtype)
     if kind == 2:
-        turned = whole << np.uint32(turn) | whole >> np.uint32(-turn & 31) if turn else whole
+        turned = words << np.uint32(turn) | words >> np.uint32(-turn & 31) if turn else words
         return (np.bitwise_xor.accumulate(turned, axis=0) ^ first).view(np.uint8)
-    one = whole.dtype.type(1)
-    steps = whole >> one ^ (0 - (whole & one)).astype(whole.dtype)
-    return (np.cumsum(steps, axis=0, dtype=whole.dtype) + first).view(np.uint8)
+    one = words.dtype.type(1)
+    steps = words >> one ^ (0 - (words & one)).astype(words.dtype)
+    return (np.cumsum(steps, axis=0, dtype=words.dtype) + first).view(np.uint8)
 
 
 def _varint(data: Iterator[int]) -> int:
@@ -152,7 +152,7 @@ def _triangles(data: bytes, count: int) -> list[int]:
         raise KeyError(f"header {data[0]}")
     codes, rest, table = data[1 : 1 + count // 3], iter(data[1 + count // 3 : -16]), data[-16:]
     edges: deque[tuple[int, int]] = deque(maxlen=16)
-    seen: deque[int] = deque(maxlen=16)
+    recent: deque[int] = deque(maxlen=16)
     unused, last, out = numbers(), 0, []
 
     def explicit() -> int:
@@ -167,9 +167,9 @@ def _triangles(data: bytes, count: int) -> list[int]:
             if low in (13, 14):
                 c = last = last + (1 if low == 14 else -1) & WRAP
             else:
-                c = next(unused) if low == 0 else explicit() if low == 15 else seen[low]
+                c = next(unused) if low == 0 else explicit() if low == 15 else recent[low]
             if low == 0 or low > 12:
-                seen.appendleft(c)
+                recent.appendleft(c)
         else:
             pair = table[low] if low < 14 else next(rest)
             if low >= 14 and pair == 0:
@@ -177,12 +177,12 @@ def _triangles(data: bytes, count: int) -> list[int]:
             corner = [explicit() if low == 15 else next(unused)]
             new = corner[:]
             for half in (pair >> 4, pair & 15):
-                corner.append(next(unused) if half == 0 else explicit() if half == 15 else seen[half - 1])
+                corner.append(next(unused) if half == 0 else explicit() if half == 15 else recent[half - 1])
                 if half in (0, 15):
                     new.append(corner[-1])
             a, b, c = corner
             edges.appendleft((b, a))
-            seen.extendleft(new)
+            recent.extendleft(new)
         edges.appendleft((c, b))
         edges.appendleft((a, c))
         out += [a, b, c]
@@ -190,14 +190,14 @@ def _triangles(data: bytes, count: int) -> list[int]:
 
 
 def _octahedral(raw: Any) -> Any:
-    """Return unit vectors, and the fourth number as it is."""
+    """Return unit vectors, and the fourth component unchanged."""
     kind = f"<i{raw.shape[1] // 4}"
     values = raw.view(kind).copy()
     flat = values[:, :2] / np.maximum(values[:, 2:3].astype(float), 1)
     z = 1 - np.abs(flat).sum(axis=1, keepdims=True)
     flat -= np.copysign(np.minimum(z, 0), flat)
-    ups = np.hstack([flat, z])
-    values[:, :3] = np.rint(ups / np.linalg.norm(ups, axis=1, keepdims=True) * np.iinfo(kind).max)
+    normals = np.hstack([flat, z])
+    values[:, :3] = np.rint(normals / np.linalg.norm(normals, axis=1, keepdims=True) * np.iinfo(kind).max)
     return values
 
 
@@ -223,8 +223,8 @@ def _colours(raw: Any) -> Any:
     y, alpha = y & most, alpha & most
     top = (1 << np.frexp(np.maximum(alpha, 1))[1]) - 1
     alpha = (alpha & top >> 1) << 1 | alpha & 1
-    whole = np.stack([y + orange - green, y + green, y - orange - green, alpha], axis=1)
-    return np.clip(np.rint(whole * (most / top[:, None])), 0, most).astype(f"<u{width}")
+    channels = np.stack([y + orange - green, y + green, y - orange - green, alpha], axis=1)
+    return np.clip(np.rint(channels * (most / top[:, None])), 0, most).astype(f"<u{width}")
 
 
 FILTERS: dict[str, Callable[[Any], Any]] = {

@@ -1,4 +1,4 @@
-"""Finds rotation, scale and centre of an imported head from its blend shapes."""
+"""Rotation, scale and centre of an imported head, computed from its blend shapes."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,7 +14,7 @@ UNITS = {"metres": 1.0, "decimetres": 0.1, "centimetres": 0.01, "millimetres": 0
 EYE_DISTANCES = (0.048, 0.078)  # m; range for people from six years on
 USUAL_EYE_DISTANCE = 0.062  # m
 MIN_COSINE = np.cos(np.radians(20))  # a head that is nearer to the file's axes is aligned with them
-SAME_PLACE = 1e-3  # of the head's size; places that are nearer are the same
+SAME_PLACE = 1e-3  # of the head's size; nearer points are the same
 UPPER = ("brow", "eye")
 LOWER = ("mouth",)
 # Shapes that show where the eyes are; the first that exists is used.
@@ -30,12 +30,12 @@ class Pose:
     middle: Float64  # (3,) point between the eyes, in the file's coordinates
     unit: str  # the name of the file's unit; "" if it is unknown
     swapped: bool  # whether its left shapes move the character's right side
-    notes: tuple[str, ...]  # how it was found
+    notes: tuple[str, ...]  # for the report
     unsure: tuple[str, ...]  # guesses that the user has to check
 
 
 def pose_of(surface: Surface) -> Pose:
-    """Return the pose of a head, found from the vertices that its shapes move.
+    """Return the pose of a head, computed from the vertices that its shapes move.
 
     Raises:
         FaceError: there is no shape of each eye, or shapes of different places move the same vertices.
@@ -52,8 +52,8 @@ def pose_of(surface: Surface) -> Pose:
             "cannot be told; export the head with its ARKit shapes"
         )
     across = np.sum([a - b for a, b in pairs], axis=0) if pairs else np.zeros(3)
-    high = [place for name, place in centres.items() if name.startswith(UPPER)]
-    low = [place for name, place in centres.items() if name.startswith(LOWER)]
+    high = [centre for name, centre in centres.items() if name.startswith(UPPER)]
+    low = [centre for name, centre in centres.items() if name.startswith(LOWER)]
     notes, unsure = [], []
     if not pairs or not high or not low:
         missing = "of two sides" if not pairs else "of eyes or brows" if not high else "of the mouth"

@@ -1,4 +1,4 @@
-"""A classifier of a mesh's parts, by name and by what moves together."""
+"""A classifier of a mesh's parts, by names and by blend shapes."""
 
 import re
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from realizer.core.errors import FaceError
 from realizer.face.mesh_geometry import fit_ball
 from realizer_studio.faces.arkit.mesh_merge import Surface, part_of
 
-ROUND = 0.06  # of its radius: how far an eyeball's vertices may lie off the ball that fits them
+ROUND = 0.06  # of its radius: the largest distance of an eyeball's vertices from the fitted ball
 BALL = (0.006, 0.022)  # m, radii of eyeballs
 EYEBALL = 0.012  # m, the radius of people's eyes
-AT_EYE = 0.016  # m; a ball that has its middle so near to where the lids close is an eye
+AT_EYE = 0.016  # m; the largest height of an eyeball's centre relative to where the lids close
 USUAL_MOUTH = np.array([0.0, -0.072, 0.028])  # m; of a head without shapes
-FLOOR, ASIDE = -0.31, 0.24  # m; the bust ends there
+FLOOR, HALF_WIDTH = -0.31, 0.24  # m; lower end and half width of the bust
 LOOKS = ("eyeLookDown", "eyeLookUp", "eyeLookIn", "eyeLookOut")
 ORDER = (
     "skin", "brows", "lashes", "left_eye", "right_eye", "upper_teeth", "lower_teeth", "tongue", "beard",
@@ -27,24 +27,24 @@ ORDER = (
 
 @dataclass(frozen=True)
 class HeadParts:
-    """Which vertices are what."""
+    """The vertices of the parts of a head."""
 
-    parts: dict[str, Any]  # name -> (k,) vertices, in the order that the face folder keeps them
-    painted: bool  # the eyes are no balls of their own; they are part of the skin's mesh
-    words: tuple[str, ...]  # how parts were found
+    parts: dict[str, Any]  # name -> (k,) vertices, in the order of the face folder
+    painted: bool  # whether the eyes are part of the skin's mesh
+    notes: tuple[str, ...]  # for the report
     unsure: tuple[str, ...]  # guesses to check by eye
 
     def arranged(self, surface: Surface) -> tuple[Surface, dict[str, tuple[int, int]]]:
-        """Return the surface with its vertices part after part, and each part's first vertex and last + 1."""
+        """Return the surface with its vertices ordered by part, and each part's first vertex and last + 1."""
         ends = np.cumsum([0] + [len(index) for index in self.parts.values()]).tolist()
-        whole = surface.subset(np.concatenate(list(self.parts.values())))
-        return whole, dict(zip(self.parts, pairwise(ends), strict=True))
+        reordered = surface.subset(np.concatenate(list(self.parts.values())))
+        return reordered, dict(zip(self.parts, pairwise(ends), strict=True))
 
 
 def sort_parts(surface: Surface) -> HeadParts:
     """Return the parts of an upright head in metres with its origin between the eyes.
 
-    Where there are no shapes, the largest piece is the skin.
+    Without shapes, the largest piece is the skin.
 
     Raises:
         FaceError: no skin that the shapes move, or no eyes.
@@ -62,30 +62,30 @@ def sort_parts(surface: Surface) -> HeadParts:
     unsure = []
     main = int(np.argmax(moved))
     for k in range(label.max() + 1):
-        mine = np.flatnonzero(label == k)
-        # A piece with several materials takes the part of most of its surface.
-        votes = np.bincount([names.index(named[p]) for p in surface.piece[mine]], minlength=len(names))
+        piece = np.flatnonzero(label == k)
+        # A piece with several materials belongs to the part of most of its vertices.
+        votes = np.bincount([names.index(named[p]) for p in surface.piece[piece]], minlength=len(names))
         part = names[int(np.argmax(votes))]
         if part in ("", "skin"):
-            part = "skin" if k == main else _by_shape(surface, mine, part)
-        of[mine] = names.index(part)
+            part = "skin" if k == main else _by_shape(surface, piece, part)
+        of[piece] = names.index(part)
     parts = {name: np.flatnonzero(of == names.index(name)) for name in names if name}
-    words = []
+    notes = []
     if len(parts["glass"]):
-        words.append("left out what lies over the eyes to be seen through")
+        notes.append("left out what lies over the eyes to be seen through")
     eyes = parts.pop("eye")
     for name, side in (("left_eye", 1), ("right_eye", -1)):
         parts[name] = eyes[surface.vertices[eyes, 0] * side > 0]
     painted = not len(parts["left_eye"]) or not len(parts["right_eye"])
     if painted:
         parts |= _painted(surface, parts)
-        words.append("the eyes are no balls of their own: the eyeLook shapes turn them")
-    upper, lower, doubt = _teeth(surface, parts.pop("teeth"))
+        notes.append("the eyes are no balls of their own: the eyeLook shapes turn them")
+    upper, lower, doubts = _teeth(surface, parts.pop("teeth"))
     parts["upper_teeth"], parts["lower_teeth"] = upper, lower
-    unsure += doubt
+    unsure += doubts
     parts.pop("glass")
-    # Hands and feet belong to no bust.
-    keep: Bool = (surface.vertices[:, 1] > FLOOR) & (np.abs(surface.vertices[:, 0]) < ASIDE)
+    # Hands and feet are cut off.
+    keep: Bool = (surface.vertices[:, 1] > FLOOR) & (np.abs(surface.vertices[:, 0]) < HALF_WIDTH)
     parts = {name: parts[name][keep[parts[name]]].astype(np.int32) for name in ORDER}
     if len(parts["other"]):
         unsure.append(
@@ -93,13 +93,13 @@ def sort_parts(surface: Surface) -> HeadParts:
             "material hair, brows, lashes, teeth, tongue, eye, shirt or skin"
         )
     parts = {name: index for name, index in parts.items() if len(index)}
-    words.insert(0, ", ".join(f"{name} {len(index)}" for name, index in parts.items()) + " vertices")
-    return HeadParts(parts, painted, tuple(words), tuple(unsure))
+    notes.insert(0, ", ".join(f"{name} {len(index)}" for name, index in parts.items()) + " vertices")
+    return HeadParts(parts, painted, tuple(notes), tuple(unsure))
 
 
-def _by_shape(surface: Surface, mine: Any, named: str) -> str:
-    """Return the part of a piece whose names say nothing."""
-    at = surface.vertices[mine]
+def _by_shape(surface: Surface, index: Any, named: str) -> str:
+    """Return the part of a piece by its shape and movement, if its names do not tell it."""
+    at = surface.vertices[index]
     middle = (at.min(axis=0) + at.max(axis=0)) / 2
     if is_ball(at) and abs(middle[1]) < AT_EYE and 0.015 < abs(middle[0]) < 0.055 and middle[2] > -0.05:
         return "eye"
@@ -110,18 +110,18 @@ def _by_shape(surface: Surface, mine: Any, named: str) -> str:
         mouth = surface.centre(moves) if moves else USUAL_MOUTH
         inside = (np.abs(at[:, 0]) < 0.035) & (at[:, 2] < mouth[2] + 0.006)
         if inside.all() and abs(middle[1] - mouth[1]) < 0.035 and middle[2] > mouth[2] - 0.07:
-            return "tongue" if _amount(surface, mine, "tongueOut") > 0.002 else "teeth"
-    moved = max((_amount(surface, mine, name) for name in surface.moves), default=0.0)
-    return "skin" if moved > 0.004 and len(mine) > 200 else "other"
+            return "tongue" if _amount(surface, index, "tongueOut") > 0.002 else "teeth"
+    moved = max((_amount(surface, index, name) for name in surface.moves), default=0.0)
+    return "skin" if moved > 0.004 and len(index) > 200 else "other"
 
 
 def is_ball(at: Float64) -> bool:
-    """Return whether vertices (n, 3) in metres lie on most of a ball of an eye's size."""
+    """Return whether most of the vertices (n, 3) in metres lie on a ball of an eye's size."""
     if len(at) < 12:
         return False
     centre, radius = fit_ball(at)
-    off = np.abs(np.linalg.norm(at - centre, axis=1) - radius)
-    return bool(BALL[0] < radius < BALL[1] and np.percentile(off, 80) < ROUND * radius)
+    deviation = np.abs(np.linalg.norm(at - centre, axis=1) - radius)
+    return bool(BALL[0] < radius < BALL[1] and np.percentile(deviation, 80) < ROUND * radius)
 
 
 def ball_behind(at: Float64) -> tuple[Float64, float]:
@@ -130,12 +130,12 @@ def ball_behind(at: Float64) -> tuple[Float64, float]:
     return np.array([middle[0], middle[1], at[:, 2].max() - EYEBALL]), EYEBALL
 
 
-def _amount(surface: Surface, mine: Any, name: str) -> float:
-    return float(np.linalg.norm(surface.move(name)[mine], axis=1).max(initial=0))
+def _amount(surface: Surface, index: Any, name: str) -> float:
+    return float(np.linalg.norm(surface.move(name)[index], axis=1).max(initial=0))
 
 
 def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
-    """Return the vertices of the skin that look around: eyes that are part of the face's mesh."""
+    """Return the eyes in the skin's mesh, which eyeLook shapes move, and the rest of the skin."""
     out: dict[str, Any] = {}
     skin = np.zeros(len(surface.vertices), bool)
     skin[parts["skin"]] = True
@@ -152,23 +152,23 @@ def _painted(surface: Surface, parts: dict[str, Any]) -> dict[str, Any]:
     return out | {"skin": np.setdiff1d(parts["skin"], taken).astype(np.int32)}
 
 
-def _teeth(surface: Surface, mine: Any) -> tuple[Any, Any, list[str]]:
-    """Return upper teeth, lower teeth, which move with the jaw, and doubts."""
-    if not len(mine):
-        return mine, mine, []
-    drop = np.linalg.norm(surface.move("jawOpen")[mine], axis=1)
-    labels = surface.subset(mine).components()
+def _teeth(surface: Surface, index: Any) -> tuple[Any, Any, list[str]]:
+    """Return the upper teeth, the lower teeth, which move with the jaw, and notes about doubts."""
+    if not len(index):
+        return index, index, []
+    drop = np.linalg.norm(surface.move("jawOpen")[index], axis=1)
+    labels = surface.subset(index).components()
     if drop.max() > 0.004:
         mean = np.bincount(labels, drop) / np.bincount(labels)
         lower: Bool = mean[labels] > 0.5 * drop.max()
-        return mine[~lower], mine[lower], []
-    # The jaw of a file may be a bone, or fixed: names decide, then height.
+        return index[~lower], index[lower], []
+    # In some files the jaw is a bone or fixed: then names decide, or the height.
     names = [" ".join(names).lower() for names in surface.names]
-    low = np.array([bool(re.search(r"lower|bottom|_lo", name)) for name in names])[surface.piece[mine]]
+    low = np.array([bool(re.search(r"lower|bottom|_lo", name)) for name in names])[surface.piece[index]]
     if low.any() and not low.all():
-        return mine[~low], mine[low], []
-    height = surface.vertices[mine, 1]
+        return index[~low], index[low], []
+    height = surface.vertices[index, 1]
     tops = np.bincount(labels, height) / np.bincount(labels)
     lower = tops[labels] < (height.min() + height.max()) / 2
     doubt = "jawOpen does not move the teeth: parted by their height, look at them"
-    return mine[~lower], mine[lower], [doubt]
+    return index[~lower], index[lower], [doubt]

@@ -1,4 +1,4 @@
-"""Finds the 84 feature points of an imported head by its geometry and its blend shapes."""
+"""The 84 feature points of an imported head, located by its geometry and its blend shapes."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -39,7 +39,7 @@ def points_of(
     """
     at, parts = surface.vertices, dict(ranges)
     if painted:
-        # Such eyes have no eyeballs to measure, so assume eyeballs behind them.
+        # Painted eyes have no eyeballs to measure, so eyeballs are assumed behind them.
         for name in PUPILS:
             centre, radius = ball_behind(surface.vertices[slice(*ranges[name])])
             parts[name] = (len(at), len(at) + len(SPHERE))
@@ -86,9 +86,9 @@ def _inner_lips(skin: Surface, points: Mapping[str, Point], first: int) -> dict[
         distance = np.asarray(cKDTree(at[other]).query(at[lip])[0])
         cost = distance + DEPTH_WEIGHT * (front - at[lip, 2])
         for name, x in names.items():
-            aside = np.abs(at[lip, 0] - x)
-            near = np.flatnonzero(aside < max(SEARCH_WIDTH, 1.01 * float(aside.min())))
-            best = near[np.argmin(cost[near] + 0.5 * aside[near])]
+            lateral = np.abs(at[lip, 0] - x)
+            nearby = np.flatnonzero(lateral < max(SEARCH_WIDTH, 1.01 * float(lateral.min())))
+            best = nearby[np.argmin(cost[nearby] + 0.5 * lateral[nearby])]
             out[name] = first + int(lip[best])
     return out
 
@@ -102,13 +102,13 @@ def _lids(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, i
         if blink is None or not blink.any():
             continue
         at: Float64 = skin.vertices
-        aside = np.abs(at[:, 0] - points[pupil].x)
-        fall = -blink[:, 1] - 0.3 * aside
-        near = (aside < 0.004) & (at[:, 2] > points[pupil].z - 0.012)
-        if not near.any() or fall[near].max() <= 0:
+        lateral = np.abs(at[:, 0] - points[pupil].x)
+        fall = -blink[:, 1] - 0.3 * lateral
+        nearby = (lateral < 0.004) & (at[:, 2] > points[pupil].z - 0.012)
+        if not nearby.any() or fall[nearby].max() <= 0:
             continue
-        # The foremost vertex, because the inside of the lid moves down too.
-        strong = np.flatnonzero(near & (fall > 0.93 * fall[near].max()))
+        # The foremost vertex is taken, because the inside of the lid moves down too.
+        strong = np.flatnonzero(nearby & (fall > 0.93 * fall[nearby].max()))
         upper = int(strong[np.argmax(at[strong, 2])])
         closed = at + blink
         distance = np.linalg.norm(closed - closed[upper], axis=1)

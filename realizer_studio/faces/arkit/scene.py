@@ -25,10 +25,10 @@ class Piece:
     vertices: Float64  # (n, 3) in the unit and the axes of the file
     triangles: Int32  # (m, 3)
     colours: Float64  # (n, 3) sRGB 0..255, of the vertices alone
-    uv: Float64  # (n, 2) places in the textures of its material, (0, 0) at the top left
-    material: Material  # what it looks like
+    uv: Float64  # (n, 2) texture coordinates, (0, 0) at the top left
+    material: Material
     glass: bool = False  # whether the surface is transparent
-    notes: tuple[str, ...] = ()  # what of its material will not be drawn
+    notes: tuple[str, ...] = ()  # properties of its material that are not drawn
     moves: dict[str, Float64] = field(default_factory=dict)  # name of a morph target -> (n, 3) displacements
 
 
@@ -63,14 +63,14 @@ def _world_matrices(gltf: Gltf) -> Iterator[tuple[int, Float64]]:
     else:
         children = {k for node in nodes for k in node.get("children", [])}
         pending = [(k, np.eye(4)) for k in range(len(nodes)) if k not in children]
-    seen: set[int] = set()
+    visited: set[int] = set()
     while pending:
         number, parent = pending.pop(0)
-        if number in seen:
+        if number in visited:
             raise FaceError(
                 f"{gltf.path}: wanted a tree, got nodes[{number}] twice: of two parents or of itself"
             )
-        seen.add(number)
+        visited.add(number)
         node = gltf.item("nodes", number)
         world = parent @ _matrix(node)
         yield number, world
@@ -112,7 +112,7 @@ def _piece(
     corners = corners.astype(np.int64)
     material, notes = read_material(gltf, primitive.get("material"))
     colours, alpha = _colours(gltf, attributes, n, where)
-    uv, material, lost = _places(gltf, material, attributes, n, where)
+    uv, material, lost = _texture_coordinates(gltf, material, attributes, n, where)
     skinning = _skinning(gltf, node, attributes, worlds, n, where)
     matrices = np.broadcast_to(world, (n, 4, 4)) if skinning is None else skinning
     triangles = _triangles(corners, primitive.get("mode", TRIANGLES))
@@ -147,14 +147,14 @@ def _attribute(
     """Return an attribute (n, width) of the vertices of a primitive.
 
     Raises:
-        FaceError: its shape is another, or a value is not finite.
+        FaceError: it has another shape, or a value is not finite.
     """
     values = gltf.accessor(attributes[name])
     is_finite = bool(np.isfinite(values).all())
     if len(values) != n or values.shape[1] not in widths or not is_finite:
-        wanted = f"{n} x {' or '.join(map(str, widths))} finite numbers"
+        expected = f"{n} x {' or '.join(map(str, widths))} finite numbers"
         got = " x ".join(map(str, values.shape)) if is_finite else "NaN or infinity"
-        raise FaceError(f"{where}: {name}: wanted {wanted}, got {got}; export the head again")
+        raise FaceError(f"{where}: {name}: wanted {expected}, got {got}; export the head again")
     return values
 
 
@@ -224,7 +224,7 @@ def _colours(gltf: Gltf, attributes: dict[str, Any], n: int, where: str) -> tupl
     return np.asarray(srgb(light[:, :3].astype(np.float32)), np.float64) * 255, light[:, 3]
 
 
-def _places(
+def _texture_coordinates(
     gltf: Gltf, material: Material, attributes: dict[str, Any], n: int, where: str
 ) -> tuple[Float64, Material, tuple[str, ...]]:
     """Return the places (n, 2) in a material's textures; without textures if the vertices have no places."""
@@ -247,14 +247,14 @@ def _is_glass(gltf: Gltf, material: Material, uv: Float64, alpha: Float64, trian
         return True
     if material.alpha != "BLEND" or not len(triangles):
         return False
-    seen = alpha[triangles].mean(axis=1) * material.colour[3]
+    visible = alpha[triangles].mean(axis=1) * material.colour[3]
     base = dict(material.textures).get("base")
     pixels = gltf.pixels(base.image) if base else None
     if pixels is not None:
         height, width = pixels.shape[:2]
         x, y = (uv[triangles].mean(axis=1) * (width, height)).astype(int).T
-        seen = seen * pixels[y % height, x % width, 3] / 255
-    return float(np.percentile(seen, 90)) < MAX_GLASS_ALPHA
+        visible = visible * pixels[y % height, x % width, 3] / 255
+    return float(np.percentile(visible, 90)) < MAX_GLASS_ALPHA
 
 
 EXTENSION = "KHR_draco_mesh_compression"

@@ -12,23 +12,23 @@ from realizer.face.au.regions import fit_mouth
 from realizer.face.au.units import units
 from realizer.face.model import Face
 from realizer.tables import action_units
-from realizer_studio.faces.au.fit_limits import FURTHEST, WatchedPlaces, furthest, watched_places
+from realizer_studio.faces.au.fit_limits import FURTHEST, MonitoredPoints, furthest, monitored_points
 from realizer_studio.faces.au.measure import UnitMeasurement
-from realizer_studio.faces.au.solve import STILL, Fit
+from realizer_studio.faces.au.solve import UNMOVED_WEIGHT, Fit
 
 FORMS = ("published", "extended")  # one or two Gaussians; up to four
-MOVES = 0.01  # of the largest move: what moves less does not count as displaced
-NEAR = 0.01  # m around displaced points; farther away, one point in FAR shows leaks
-FAR = 4
-THIN = 3  # one in so many of the points that do not count
+MOVES = 0.01  # of the largest displacement; smaller ones count as undisplaced
+NEAR = 0.01  # m around displaced points, within which all points are used
+FAR = 4  # one in so many of the points farther away is used
+THIN = 3  # one in so many of the undisplaced points near them is used
 HIDDEN = 0.1  # weight of hidden points
 PARTS = 4  # of landmarks, each of which is left out once
-AWAY = 0.14  # m from the middle of the eyes down to where no face moves
+LOWEST = 0.14  # m below the eyes, where faces do not move
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of her table 4.3, in metres, over points that one sees and that move more than 1 % of d_max."""
+    """A row of Wojdel's table 4.3, in metres, over visible points that move by more than 1 % of d_max."""
 
     au: int
     n: int
@@ -39,7 +39,7 @@ class Row:
 
     @property
     def ratio(self) -> float:
-        """e / d_max, what models are compared by."""
+        """e / d_max, by which models are compared."""
         return self.e / self.d_max
 
 
@@ -47,24 +47,24 @@ def fit_models(
     face: Face,
     measured: Mapping[int, UnitMeasurement],
     forms: Sequence[str] = FORMS,
-    say: Callable[[str], None] = lambda _: None,
+    progress: Callable[[str], None] = lambda _: None,
     source: str = "",
 ) -> dict[str, Model]:
-    """Fit the displacement units that were measured; the turns come from the face's own pivots.
+    """Fit the measured displacement units; rotations come from the face's pivots.
 
-    Each function is fitted by its own cost first (4.8, 4.9), then both are polished together. The extended
-    form grows out of the published one. No vertex of the face may go much further than the furthest landmark.
+    Density and direction are first fitted separately (4.8, 4.9), then together. The extended form starts from
+    the published one. No vertex of the face may move much further than the furthest landmark.
 
     Args:
         forms: of "published" (one or two Gaussians) and "extended" (up to four).
-        say: called with each action unit when it is fitted.
+        progress: called with a sentence for each fitted action unit.
         source: the source of the measurements, for the models' headers.
 
     Returns:
-        A model of each form.
+        Form -> model.
 
     Raises:
-        FaceError: an unknown form, or a measurement from which nothing can be fitted.
+        FaceError: an unknown form, or a measurement without a visible displacement.
     """
     for form in forms:
         if form not in FORMS:
@@ -72,13 +72,13 @@ def fit_models(
     mouth = fit_mouth(face)
     y, z = (np.asarray(face.points["2.1"][1:], np.float64) - face.basis["chin"]).tolist()
     jaw = 0.0, float(y), float(z)
-    places, finer = watched_places(face, mouth), watched_places(face, mouth, between=True)
+    points, finer = monitored_points(face, mouth), monitored_points(face, mouth, between=True)
     fitted: dict[str, dict[int, UnitModel]] = {form: {} for form in forms}
     for au, one in measured.items():
         ratios = []
         size = _d_max(one)
-        found = _fit_unit(one, mouth, places, forms)
-        # Seldom does a unit run away between vertices that stay: then all these places are watched.
+        found = _fit_unit(one, mouth, points, forms)
+        # Rarely a unit moves points between vertices too far: then those points are monitored as well.
         if any(furthest(unit, mouth, finer)[0] > FURTHEST * size for unit in found.values()):
             found = _fit_unit(one, mouth, finer, forms)
         for form, unit in found.items():
@@ -86,7 +86,7 @@ def fit_models(
                 unit = UnitModel(au, unit.motions, _jaw_degrees(face, unit, mouth, jaw))
             fitted[form][au] = unit
             ratios.append(f"{_row(unit, one, mouth).ratio:.3f}")
-        say(f"AU{au}: e/d_max {', '.join(ratios)}")
+        progress(f"AU{au}: e/d_max {', '.join(ratios)}")
     degrees = {row.au: row.degrees for row in action_units()}
     left, right = (_triple(centre) for _, centre in face.basis["eyes"])
     head = _head(face)
@@ -107,7 +107,7 @@ def fit_models(
 
 
 def table(model: Model, measured: Mapping[int, UnitMeasurement]) -> tuple[Row, ...]:
-    """Return Wojdel's table 4.3 for the units that both have."""
+    """Return Wojdel's table 4.3 for the units in both arguments."""
     return tuple(_row(model.units[au], one, model.mouth) for au, one in measured.items() if au in model.units)
 
 
@@ -127,18 +127,18 @@ def table_text(rows: tuple[Row, ...]) -> str:
 
 
 def left_out_text(face: Face, measured: Mapping[int, UnitMeasurement], models: Mapping[str, Model]) -> str:
-    """Return how well the forms of models hold on landmarks that they were not fitted to.
+    """Return the errors of models on landmarks that they were not fitted to, by cross-validation.
 
-    The landmarks of each unit are left out in turn, a quarter at a time. Units with more figures than
-    measured numbers are named, as they follow their landmarks anyway.
+    A quarter of the landmarks of each unit is left out at a time. Units with more parameters than measured
+    numbers are named, because they fit their landmarks anyway.
     """
     mouth = fit_mouth(face)
-    places, forms = watched_places(face, mouth), tuple(models)
+    points, forms = monitored_points(face, mouth), tuple(models)
     lines = []
     for au, one in measured.items():
         size, long = _d_max(one), np.linalg.norm(one.moves, axis=1)
         counts = one.visible & (long > MOVES * size)
-        missed = {form: long.copy() for form in forms}  # of a unit that keeps still
+        missed = {form: long.copy() for form in forms}  # the error of a unit without displacement
         order = np.random.default_rng(0).permutation(len(long))
         for out in (order[k::PARTS] for k in range(PARTS)):
             rest = np.setdiff1d(order, out)
@@ -146,9 +146,9 @@ def left_out_text(face: Face, measured: Mapping[int, UnitMeasurement], models: M
                 continue
             upper = [None, None] if one.upper is None else [one.upper[rest], one.upper[out]]
             part = UnitMeasurement(au, one.at[rest], one.moves[rest], one.visible[rest], upper[0])
-            for form, unit in _fit_unit(part, mouth, places, forms).items():
-                there = unit.displacement(one.at[out], mouth, upper[1])
-                missed[form][out] = np.linalg.norm(there - one.moves[out], axis=1)
+            for form, unit in _fit_unit(part, mouth, points, forms).items():
+                predicted = unit.displacement(one.at[out], mouth, upper[1])
+                missed[form][out] = np.linalg.norm(predicted - one.moves[out], axis=1)
         for form, model in models.items():
             figures = sum(
                 m.gaussians.size + np.count_nonzero(m.alpha) + np.count_nonzero(m.beta)
@@ -179,22 +179,23 @@ def _row(unit: UnitModel, one: UnitMeasurement, mouth: Mouth) -> Row:
 
 
 def _fit_unit(
-    one: UnitMeasurement, mouth: Mouth, places: WatchedPlaces, forms: Sequence[str]
+    one: UnitMeasurement, mouth: Mouth, points: MonitoredPoints, forms: Sequence[str]
 ) -> dict[str, UnitModel]:
-    # Her units are symmetric: a measurement of one side holds for the other, so both are folded to the left.
+    # Wojdel's units are symmetric, so the measurements of both sides are mirrored to the left.
     flip = np.where(one.at[:, :1] < 0, [-1.0, 1.0, 1.0], 1.0)
     at, moves = one.at * flip, one.moves * flip
     long = np.linalg.norm(moves, axis=1)
     size = _d_max(one)
-    weight = np.where(one.visible, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, STILL)
-    # A point in the middle counts once, any other one also for its mirror image.
+    weight = np.where(one.visible, 1.0, HIDDEN) * np.where(long > MOVES * size, 1.0, UNMOVED_WEIGHT)
+    # A point counts also for its mirror image, except in the middle.
     weight = weight * np.where(at[:, 0] < 1e-6, 0.5, 1.0)
     halves = {"whole": weight}
     if units()[one.au].split:
         upper = mouth.upper(at) if one.upper is None else one.upper
         halves = {"upper": weight * upper, "lower": weight * (1 - upper)}
     motions = {
-        half: _fit_motion(at, moves, mine, size, places.of(half), forms) for half, mine in halves.items()
+        half: _fit_motion(at, moves, half_weight, size, points.of(half), forms)
+        for half, half_weight in halves.items()
     }
     return {form: UnitModel(one.au, {half: found[form] for half, found in motions.items()}) for form in forms}
 
@@ -203,20 +204,20 @@ def _fit_motion(
     at: Float64, moves: Float64, weight: Float64, size: float, around: Float64, forms: Sequence[str]
 ) -> dict[str, Motion]:
     long = np.linalg.norm(moves, axis=1)
-    here = weight > 1e-3
-    moved = here & (long > MOVES * size)
-    if not moved.any():  # this half keeps still
+    counted = weight > 1e-3
+    moved = counted & (long > MOVES * size)
+    if not moved.any():  # this half does not move
         bell = np.array([[0, 0, 0, 0, 1, 0, 1, 0, 0, 1.0]])
-        still = np.zeros(19)
-        return dict.fromkeys(forms, Motion(np.zeros(3), bell, still, still))
+        zeros = np.zeros(19)
+        return dict.fromkeys(forms, Motion(np.zeros(3), bell, zeros, zeros))
     low, high = at[moved].min(axis=0) - NEAR, at[moved].max(axis=0) + NEAR
-    near = here & ((at > low) & (at < high)).all(axis=1)
-    # Points outside the table keep the functions tame: a part of them is enough.
-    tells = moved & (weight >= STILL)
-    near = np.flatnonzero(near & ~tells)[::THIN]
-    far = np.flatnonzero(here & (at[:, 1] > -AWAY) & ~((at > low) & (at < high)).all(axis=1))[::FAR]
-    use = np.r_[np.flatnonzero(tells), near, far]
-    weight = np.r_[weight[tells], weight[near] * THIN, weight[far] * FAR]
+    near = counted & ((at > low) & (at < high)).all(axis=1)
+    # Undisplaced points limit the functions: a part of them is enough.
+    moving = moved & (weight >= UNMOVED_WEIGHT)
+    near = np.flatnonzero(near & ~moving)[::THIN]
+    far = np.flatnonzero(counted & (at[:, 1] > -LOWEST) & ~((at > low) & (at < high)).all(axis=1))[::FAR]
+    use = np.r_[np.flatnonzero(moving), near, far]
+    weight = np.r_[weight[moving], weight[near] * THIN, weight[far] * FAR]
     share = weight * long[use]
     origin = share @ at[use] / share.sum()
     origin[0] = 0
@@ -232,7 +233,7 @@ def _fit_motion(
 
 
 def _head(face: Face) -> HeadTurn:
-    """Return the smooth step that comes nearest to how the face's own vertices follow its head."""
+    """Return the smooth step that fits best how the face's vertices follow its head."""
     from scipy.optimize import least_squares
 
     weight = np.asarray(face.basis["head"], np.float64).ravel()
@@ -249,14 +250,14 @@ def _head(face: Face) -> HeadTurn:
 
 
 def _jaw_degrees(face: Face, unit: UnitModel, mouth: Mouth, jaw: tuple[float, float, float]) -> float:
-    """Return the jaw's rotation that moves the chin as far as the unit moves it."""
+    """Return the rotation of the jaw in degrees that moves the chin as the unit does."""
     chin = np.asarray(face.points["2.1"], np.float64)
-    there = chin + unit.displacement(chin[None], mouth)[0]
-    arms = [place[1:] - np.array(jaw[1:]) for place in (chin, there)]
+    moved = chin + unit.displacement(chin[None], mouth)[0]
+    arms = [position[1:] - np.array(jaw[1:]) for position in (chin, moved)]
     before, after = (np.arctan2(arm[1], arm[0]) for arm in arms)
     return float(np.degrees((after - before + np.pi) % (2 * np.pi) - np.pi))
 
 
-def _triple(place: object) -> tuple[float, float, float]:
-    x, y, z = np.asarray(place, np.float64).tolist()
+def _triple(position: object) -> tuple[float, float, float]:
+    x, y, z = np.asarray(position, np.float64).tolist()
     return x, y, z

@@ -13,22 +13,22 @@ from realizer.face.au.units import units
 from realizer.face.reading import face_errors, read_arrays
 from realizer.tables import read_csv
 
-OPEN = 0.3  # baked light below this: inside the head, or the inner side of a lip
-COLLAR = -0.16  # m; below it no face moves
-FINE = 1e-5  # m; the shapes are stored in whole multiples of it
+OPEN = 0.3  # baked light below which a vertex is inside the head, or on the inner side of a lip
+COLLAR = -0.16  # m; below it faces do not move
+FINE = 1e-5  # m; the resolution of stored shapes
 ARRAYS = {"at": 2, "seen": 1, "upper": 1, "au": 1, "moves": 3}
 FEWEST = 8  # landmarks of an action unit: fewer leave the functions undecided
 
 
 @dataclass(frozen=True, eq=False)
 class UnitMeasurement:
-    """An action unit shown with full intensity, measured."""
+    """The measurement of an action unit with full intensity."""
 
     au: int  # its number
     at: Float64  # (n, 3) metres, the landmarks on the neutral face
-    moves: Float64  # (n, 3) metres, where each goes
-    visible: Bool  # (n,) visibility: hidden points count little in a fit and are left out of its table
-    # (n,) how far it belongs to the upper half of the face; None: as the mouth's plane says.
+    moves: Float64  # (n, 3) metres, their displacements
+    visible: Bool  # (n,) visibility: hidden points count little in a fit, and not in its table
+    # (n,) the share in the upper half of the face; None to compute it from the mouth's plane.
     upper: Float64 | None = None
 
 
@@ -46,12 +46,12 @@ class Landmark:
 
 
 def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
-    """Read measurements from a CSV file: a row a landmark and action unit (au,x,y,z,dx,dy,dz in metres).
+    """Read measurements from a CSV file with a row au,x,y,z,dx,dy,dz (metres) per landmark and action unit.
 
-    Landmarks of one side are enough (Wojdel 2005, 4.2.1): the action units are even.
+    Landmarks of one side are enough (Wojdel 2005, 4.2.1), because action units are symmetric.
 
     Raises:
-        FaceError: no such file, a bad row, a number that is not finite, a unit that is not one of her
+        FaceError: no such file, a bad row, a number that is not finite, a unit that is not one of Wojdel's
             displacements, or too few landmarks.
     """
     with face_errors(path, "a CSV file au,x,y,z,dx,dy,dz in metres"):
@@ -59,8 +59,8 @@ def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
     by_unit: dict[int, list[tuple[float, ...]]] = {}
     for row in rows:
         if row.au not in units() or units()[row.au].kind != "displacement":
-            known = ", ".join(str(unit.au) for unit in units().values() if unit.kind == "displacement")
-            raise FaceError(f"{path}: wanted action units of {known}, got {row.au}")
+            allowed = ", ".join(str(unit.au) for unit in units().values() if unit.kind == "displacement")
+            raise FaceError(f"{path}: wanted action units of {allowed}, got {row.au}")
         by_unit.setdefault(row.au, []).append(astuple(row)[1:])
     found = {}
     for au, values in sorted(by_unit.items()):
@@ -76,10 +76,10 @@ def read_measurements(path: Path) -> dict[int, UnitMeasurement]:
 
 
 def read_shapes(path: Path) -> dict[int, UnitMeasurement]:
-    """Read measurements from a face's own shapes, as `write_shapes` stores them.
+    """Read measurements from a face's shapes, as `write_shapes` stores them.
 
     Raises:
-        FaceError: no such file, or arrays that do not fit together.
+        FaceError: no such file, or arrays of inconsistent shapes.
     """
     stored = read_arrays(path, ARRAYS)
     at, moves = stored["at"].astype(np.float64), stored["moves"]
@@ -89,9 +89,9 @@ def read_shapes(path: Path) -> dict[int, UnitMeasurement]:
         raise FaceError(
             f"{path}: wanted moves of {(len(stored['au']), *at.shape)}, got {moves.shape}; make it again"
         )
-    seen, upper = stored["seen"].astype(bool), stored["upper"].astype(np.float64)
+    visible, upper = stored["seen"].astype(bool), stored["upper"].astype(np.float64)
     return {
-        int(au): UnitMeasurement(int(au), at, move.astype(np.float64) * FINE, seen, upper)
+        int(au): UnitMeasurement(int(au), at, move.astype(np.float64) * FINE, visible, upper)
         for au, move in zip(stored["au"], moves, strict=True)
     }
 

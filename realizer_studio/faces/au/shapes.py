@@ -22,53 +22,54 @@ from realizer_studio.faces.au.measure import COLLAR, OPEN, UnitMeasurement
 from realizer_studio.faces.parts import Submesh
 from realizer_studio.faces.person import makehuman
 from realizer_studio.faces.person.lips import Lips
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 from realizer_studio.faces.person.person import person_of
 from realizer_studio.faces.person.recipe import read_recipe
 from realizer_studio.faces.photo.warp import read_warp
 
 EVEN = np.array([-1.0, 1.0, 1.0])
-OFF = 5e-4  # m; added and cut vertices lie no farther than this off the base mesh
-AROUND = 32  # number of nearest triangles to look at
+MAX_DISTANCE = 5e-4  # m; the largest distance of added and cut vertices from the base mesh
+AROUND = 32  # nearest triangles that are examined
 
 
 def measure_shapes(
-    face: Face, folder: Path, data: Path, wanted: Iterable[Unit] | None = None
+    face: Face, folder: Path, data: Path, requested: Iterable[Unit] | None = None
 ) -> dict[int, UnitMeasurement]:
     """Return the shape of each displacement unit on the left half (x >= 0) of a face's skin.
 
     Args:
         face: built from the data.
-        folder: its folder; the recipe says how it was mixed.
-        data: the unpacked CC0 data, as `face.build.build_face` takes it.
-        wanted: the units, each with its mixture of shapes; None: her 22 displacements.
+        folder: its folder, with its recipe.
+        data: the unpacked CC0 data, as for `build_face`.
+        requested: the units, each with its mixture of shapes; None for Wojdel's 22 displacements.
 
     Raises:
-        FaceError: no recipe or data, or a skin that is not made from them.
+        FaceError: no recipe or data, or a skin that was not built from them.
     """
     data = makehuman.data_folder(data)
     targets = read_recipe(folder / "recipe.toml", data).targets
-    ground = person_of(data, targets, read_warp(folder)).ground
-    mesh, at = ground.mesh, ground.at
+    figure = person_of(data, targets, read_warp(folder)).figure
+    mesh, at = figure.mesh, figure.at
     twin = mesh.mirror()
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
     half = (skin[:, 0] > -1e-6) & (skin[:, 1] > COLLAR)
-    corners, share, off = _on_base(ground, face, np.flatnonzero(half))
-    if off.max() > OFF:
+    corners, share, distance = _on_base(figure, face, np.flatnonzero(half))
+    if distance.max() > MAX_DISTANCE:
         raise FaceError(
-            f"{folder}: wanted a skin made from its recipe and {data}, got one of which {(off > OFF).sum()} "
-            f"of {len(off)} vertices lie off that, up to {1000 * off.max():.1f} mm: another builder made it; "
-            f"build it again with realizer faces build {folder.name} --data"
+            f"{folder}: wanted a skin made from its recipe and {data}, got one of which "
+            f"{(distance > MAX_DISTANCE).sum()} of {len(distance)} vertices lie off that, up to "
+            f"{1000 * distance.max():.1f} mm: another builder made it; build it again with realizer faces "
+            f"build {folder.name} --data"
         )
     skin = skin[half]
-    mouth = Lips(ground)
+    mouth = Lips(figure)
     lips, lining = (np.einsum("nk,nk->n", share, part[corners]) for part in (mouth.lips, mouth.inside))
-    # The mouth's lining is painted as light as an open mouth shows it.
-    seen = (face.occlusion[first:last][half] > OPEN) & (lining < 0.5) | (lips > 0.5)
+    # The lining of the mouth has the light of an open mouth, so it is excluded by its position.
+    visible = (face.occlusion[first:last][half] > OPEN) & (lining < 0.5) | (lips > 0.5)
     upper = shares(face, fit_mouth(face))[first:last][half]
     out = {}
-    for unit in units().values() if wanted is None else wanted:
+    for unit in units().values() if requested is None else requested:
         if unit.kind == "displacement":
             shape = np.zeros_like(at)
             for name, weight in unit.mixture.items():
@@ -76,41 +77,45 @@ def measure_shapes(
                     shape += weight * makehuman.read_target(data, side, len(at)) * makehuman.DECIMETRE
             shape = (shape + shape[twin] * EVEN) / 2
             moves = np.einsum("nk,nkc->nc", share, shape[corners])
-            out[unit.au] = UnitMeasurement(unit.au, skin, moves, seen, upper)
+            out[unit.au] = UnitMeasurement(unit.au, skin, moves, visible, upper)
     return out
 
 
-def _on_base(ground: Ground, face: Face, index: Any) -> tuple[Int32, Float64, Float64]:
-    """Return the position of skin vertices on the base mesh.
+def _on_base(figure: Figure, face: Face, index: Any) -> tuple[Int32, Float64, Float64]:
+    """Return the barycentric coordinates of skin vertices on the base mesh.
 
-    Where lips or lids touch, a vertex belongs to the surface whose normal agrees with its own.
+    Where lips or lids touch, a vertex belongs to the surface with a similar normal.
 
     Args:
-        index: (n,) places in the skin.
+        index: (n,) indices of vertices of the skin.
 
     Returns:
-        (n, 3) base vertices, (n, 3) their shares, and (n,) metres that each vertex is off.
+        (n, 3) base vertices, (n, 3) their weights, and the distance of each vertex in metres, (n,).
     """
     from scipy.spatial import cKDTree
 
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
-    mine = part_triangles(face.triangles, face.parts["skin"])
-    ups, skin = vertex_normals(skin, mine)[index], skin[index]
-    body = Submesh.of_quads(ground.mesh.quads["body"], len(ground.at))
+    skin_triangles = part_triangles(face.triangles, face.parts["skin"])
+    normals, skin = vertex_normals(skin, skin_triangles)[index], skin[index]
+    body = Submesh.of_quads(figure.mesh.quads["body"], len(figure.at))
     base = body.mix.indices[body.triangles]
-    corners = ground.at[base]
-    faces = triangle_normals(ground.at, base)
+    corners = figure.at[base]
+    faces = triangle_normals(figure.at, base)
     near = np.asarray(cKDTree(corners.mean(axis=1)).query(skin, AROUND)[1])
-    places = nearest_points(corners[near], skin)
-    off = np.linalg.norm(places - skin[:, None], axis=2)
-    same = np.einsum("nkc,nc->nk", faces[near], ups) > 0
-    best = np.where(same, off, off + OFF).argmin(axis=1)
+    surface_points = nearest_points(corners[near], skin)
+    distances = np.linalg.norm(surface_points - skin[:, None], axis=2)
+    same = np.einsum("nkc,nc->nk", faces[near], normals) > 0
+    best = np.where(same, distances, distances + MAX_DISTANCE).argmin(axis=1)
     each = np.arange(len(skin))
     hit = near[each, best]
-    return base[hit].astype(np.int32), corner_shares(corners[hit], places[each, best]), off[each, best]
+    return (
+        base[hit].astype(np.int32),
+        corner_shares(corners[hit], surface_points[each, best]),
+        distances[each, best],
+    )
 
 
 def _sides(data: Path, name: str) -> tuple[str, ...]:
-    whole = (data / "faceunits01/targets/faceunits" / f"{name}.target").is_file()
-    return (name,) if whole else (f"{name}Left", f"{name}Right")
+    symmetric = (data / "faceunits01/targets/faceunits" / f"{name}.target").is_file()
+    return (name,) if symmetric else (f"{name}Left", f"{name}Right")

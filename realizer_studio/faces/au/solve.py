@@ -10,19 +10,19 @@ from realizer.core.array_types import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
 from realizer_studio.faces.au.fit_limits import overshoot
 
-STILL = 0.35  # weight of points that do not move: leaks count, but less than visible movement
-SOFT = 0.004  # of the largest move; a miss below it counts by its square, so that the cost has a slope at 0
-# Regularisation towards the start: too weak to change a fit to many points, it decides what they leave open
-# running away; of few landmarks more is undecided.
+UNMOVED_WEIGHT = 0.35  # weight of points that do not move, relative to points that do
+SOFT = 0.004  # of the largest move; smaller residuals are squared, so that the cost is smooth at 0
+# Regularisation towards the start keeps parameters bounded that landmarks leave undetermined. It is
+# stronger for few landmarks.
 CALM, FEW = 1e-3, 5.0
-TINY = 1e-6  # smallest worthwhile gain of a step, as a share of the cost
+TINY = 1e-6  # least gain of a step, as a share of the cost
 # Number of reweighting rounds for sums of lengths, in the direction's cost and in the joint one.
 ROUNDS = (4, 8)
 
 
 @dataclass(frozen=True)
 class Free:
-    """An affine map from the parameters that are free to all of them: symmetry is built in, not hoped for."""
+    """An affine map from free parameters to all parameters, which makes functions symmetric."""
 
     matrix: Float64
     offset: Float64
@@ -32,7 +32,7 @@ class Free:
 
 
 def mirrored_angles() -> tuple[Free, Free]:
-    """Return mirror symmetric angles: alpha is a right angle plus an odd function of x, beta even in x."""
+    """Return the maps of symmetric angles: alpha is a right angle plus an odd function of x, beta is even."""
     start = np.zeros(ANGLE)
     start[6], start[18] = 1, np.pi / 2
     alpha = np.eye(ANGLE)[:, [0, 1, 2, 5, 12, 13, 15]]  # xx, yy, zz, yz times x; xy, xz; x
@@ -41,7 +41,7 @@ def mirrored_angles() -> tuple[Free, Free]:
 
 
 def mirrored_gaussians(layout: str) -> Free:
-    """Return the parameters of Gaussians: `p` is a pair, one a side; `c` is central: "pc" are three."""
+    """Return the map of Gaussians in a layout such as "pc": `p` is a symmetric pair, `c` a central one."""
     from scipy.linalg import block_diag
 
     pair = np.concatenate([np.eye(GAUSSIAN), np.diag([1.0, -1, 1, 1, 1, -1, 1, -1, 1, 1])])
@@ -50,9 +50,9 @@ def mirrored_gaussians(layout: str) -> Free:
     return Free(matrix, np.zeros(len(matrix)))
 
 
-PUBLISHED, EXTENDED = ("c", "cc", "p"), ("pp", "pcc")  # layouts tried from the start, others by growth
+PUBLISHED, EXTENDED = ("c", "cc", "p"), ("pp", "pcc")  # initial layouts; others grow from them
 MOST = 4  # Gaussians of the extended form
-WIDE = (0.6, 1.4)  # cm; how wide a Gaussian that is added begins
+WIDE = (0.6, 1.4)  # cm; initial widths of an added Gaussian
 
 
 @dataclass(frozen=True)
@@ -81,35 +81,35 @@ class FitResult:
 
 
 def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, evaluations: int) -> Float64:
-    """Return the parameters of least squares; `residual` returns the residual and its derivatives.
+    """Return the parameters of least squares; `residual` returns residuals and their derivatives.
 
-    Levenberg's and Marquardt's method on the normal equations, damped as Nielsen (1999) says: with some fifty
-    parameters and thousands of residuals many times quicker than one that factors the derivatives.
+    The Levenberg-Marquardt method on the normal equations, with the damping of Nielsen (1999): for some fifty
+    parameters and thousands of residuals it is many times faster than scipy's, which factors the Jacobian.
     """
     calm = max(CALM, FEW / len(residual(start)[0])) ** 2
 
-    def look(x: Float64) -> tuple[float, Float64, Float64]:
+    def evaluate(x: Float64) -> tuple[float, Float64, Float64]:
         value, by = residual(x)
-        away = x - start
+        deviation = x - start
         square = by.T @ by
         square[np.diag_indices_from(square)] += calm
-        return float(value @ value + calm * away @ away), by.T @ value + calm * away, square
+        return float(value @ value + calm * deviation @ deviation), by.T @ value + calm * deviation, square
 
     x = start
-    cost, slope, square = look(x)
+    cost, slope, square = evaluate(x)
     scale = np.diag(square).copy()
     damping, growth = 1e-3, 2.0
     for _ in range(evaluations):
         step = np.linalg.solve(square + np.diag(damping * scale), -slope)
-        # The predicted gain: half the decrease of the quadratic model.
-        promised = float(step @ (damping * scale * step - slope))
-        if promised <= TINY * cost:
+        # The predicted gain is half the decrease of the quadratic model.
+        predicted = float(step @ (damping * scale * step - slope))
+        if predicted <= TINY * cost:
             break
-        there, slope_there, square_there = look(x + step)
-        if there < cost:
-            gain = (cost - there) / promised
-            small = cost - there <= TINY * cost
-            x, cost, slope, square = x + step, there, slope_there, square_there
+        new_cost, new_slope, new_square = evaluate(x + step)
+        if new_cost < cost:
+            gain = (cost - new_cost) / predicted
+            small = cost - new_cost <= TINY * cost
+            x, cost, slope, square = x + step, new_cost, new_slope, new_square
             scale = np.maximum(scale, np.diag(square))
             damping, growth = damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), 2.0
             if small:
@@ -120,7 +120,7 @@ def least(residual: Callable[[Any], tuple[Float64, Float64]], start: Float64, ev
 
 
 def lengths(miss: Float64, weight: Float64) -> Float64:
-    """Return weights (n,) whose sum of squares has the same slope as the weighted sum of lengths."""
+    """Return weights (n,) for which the sum of squares has the slope of the weighted sum of lengths."""
     return np.asarray(np.sqrt(weight / np.sqrt((miss**2).sum(axis=1) + SOFT**2)))
 
 
@@ -130,8 +130,8 @@ class Fit:
     Args:
         at: (n, 3) centimetres from the motion's origin; the half x >= 0 is enough.
         moves: (n, 3), the largest about 1.
-        weight: (n,) how much each point counts.
-        around: (k, 3) centimetres, where nothing may go much further than 1 (`limit.overshoot`).
+        weight: (n,) of the points.
+        around: (k, 3) centimetres, points that may not move much further than 1 (`fit_limits.overshoot`).
     """
 
     def __init__(self, at: Float64, moves: Float64, weight: Float64, around: Float64) -> None:
@@ -140,37 +140,42 @@ class Fit:
         self.alpha, self.beta = mirrored_angles()
 
     def directions(self) -> list[tuple[Float64, float]]:
-        """Free parameters of the direction function with its cost (4.8), the best first."""
+        """Return free parameters of the direction function with their costs (4.8), the best first."""
         share = self.weight * self.length
-        seen = self.length > 0.01
-        at, moves, weight, length = self.at[seen], self.moves[seen], self.weight[seen], self.length[seen]
+        moving = self.length > 0.01
+        at, moves, weight, length = (
+            self.at[moving],
+            self.moves[moving],
+            self.weight[moving],
+            self.length[moving],
+        )
         mean = (share[:, None] * self.moves).sum(axis=0)
         lean = np.arctan2(mean[1], mean[2])
         found = []
         for tilt in (lean, lean + 1.2, lean - 1.2):
             for slope in (-0.4, 0.4):
                 x = np.zeros(20)
-                # The linear form of beta's cubic part must not start at 0 with its quadratic form.
+                # The linear and the quadratic form of beta's cubic part must not both start at 0.
                 x[6], x[11], x[12], x[19] = slope, 0.01, 0.01, tilt
                 for _ in range(ROUNDS[0]):
-                    way = self._way(x, at)[0]
-                    by = lengths(moves - length[:, None] * way, weight)
+                    direction_ = self._directions_at(x, at)[0]
+                    by = lengths(moves - length[:, None] * direction_, weight)
 
                     def residual(x: Float64, by: Float64 = by) -> tuple[Float64, Float64]:
-                        way, slopes = self._way(x, at)
+                        direction_, slopes = self._directions_at(x, at)
                         scale = (by * length)[:, None]
                         return (
-                            (scale * way - by[:, None] * moves).ravel(),
+                            (scale * direction_ - by[:, None] * moves).ravel(),
                             (scale[:, None] * slopes).reshape(-1, 20),
                         )
 
                     x = least(residual, x, 12)
-                miss = moves - length[:, None] * self._way(x, at)[0]
+                miss = moves - length[:, None] * self._directions_at(x, at)[0]
                 found.append((x, float(weight @ np.linalg.norm(miss, axis=1))))
         return sorted(found, key=lambda one: one[1])
 
     def densities(self, layout: str) -> tuple[Float64, float]:
-        """Free parameters of the density function of this layout with its cost (4.9)."""
+        """Return free parameters of the density function of a layout with their cost (4.9)."""
         form = mirrored_gaussians(layout)
         x = np.array(list(self._bells(layout)))
 
@@ -188,44 +193,46 @@ class Fit:
         return x, float((residual(x)[0] ** 2).sum())
 
     def joint(self, layout: str, bells: Float64, angles: Float64) -> FitResult:
-        """Polish both functions together: minimise the weighted sum of the lengths of the misses."""
+        """Refine both functions together: minimise the weighted sum of the lengths of the errors."""
         form = mirrored_gaussians(layout)
         split = len(bells)
         x = np.concatenate([bells, angles])
 
         def moved(x: Float64) -> tuple[Float64, Float64, Float64, Float64]:
             value, by_bell = density(form(x[:split]).reshape(-1, GAUSSIAN), self.at)
-            way, by_angle = self._way(x[split:], self.at)
-            return value, by_bell @ form.matrix, way, by_angle
+            direction_, by_angle = self._directions_at(x[split:], self.at)
+            return value, by_bell @ form.matrix, direction_, by_angle
 
         def far(x: Float64) -> tuple[Float64, Float64]:
             over, steep = overshoot(form(x[:split]).reshape(-1, GAUSSIAN), self.around)
             return over, np.pad(steep @ form.matrix, ((0, 0), (0, len(x) - split)))
 
         def miss(x: Float64) -> Float64:
-            value, _, way, _ = moved(x)
-            return np.asarray(value[:, None] * way - self.moves)
+            value, _, direction_, _ = moved(x)
+            return np.asarray(value[:, None] * direction_ - self.moves)
 
-        def whole(x: Float64) -> float:
+        def total_cost(x: Float64) -> float:
             return float(self.weight @ np.linalg.norm(miss(x), axis=1) + (far(x)[0] ** 2).sum())
 
-        best, cost = x, whole(x)
+        best, cost = x, total_cost(x)
         for _ in range(ROUNDS[1]):
             by = lengths(miss(x), self.weight)
 
             def residual(x: Float64, by: Float64 = by) -> tuple[Float64, Float64]:
-                value, by_bell, way, by_angle = moved(x)
+                value, by_bell, direction_, by_angle = moved(x)
                 slopes = np.concatenate(
-                    [way[:, :, None] * by_bell[:, None, :], value[:, None, None] * by_angle], axis=2
+                    [direction_[:, :, None] * by_bell[:, None, :], value[:, None, None] * by_angle], axis=2
                 )
                 over, steep = far(x)
                 return (
-                    np.concatenate([(by[:, None] * (value[:, None] * way - self.moves)).ravel(), over]),
+                    np.concatenate(
+                        [(by[:, None] * (value[:, None] * direction_ - self.moves)).ravel(), over]
+                    ),
                     np.concatenate([(by[:, None, None] * slopes).reshape(-1, len(x)), steep]),
                 )
 
             x = least(residual, x, 25)
-            now = whole(x)
+            now = total_cost(x)
             if now > cost * 0.999:
                 best, cost = (x, now) if now < cost else (best, cost)
                 break
@@ -234,18 +241,18 @@ class Fit:
 
     def published(self) -> FitResult:
         """Return the best fit of one or two Gaussians."""
-        ways = self.directions()
-        ways = [ways[0], *(one for one in ways[1:] if one[1] > ways[0][1] * 1.02)][:2]
+        starts = self.directions()
+        starts = [starts[0], *(one for one in starts[1:] if one[1] > starts[0][1] * 1.02)][:2]
         found = [
             self.joint(layout, self.densities(layout)[0], angles)
             for layout in PUBLISHED
-            for angles, _ in ways
+            for angles, _ in starts
         ]
-        found += [self.joint(*start) for one in found[: len(ways)] for start in self._grown(one, 2)]
+        found += [self.joint(*start) for one in found[: len(starts)] for start in self._grown(one, 2)]
         return min(found, key=lambda one: one.cost)
 
     def extended(self, published: FitResult) -> FitResult:
-        """Return the best fit of up to four Gaussians, added where most is missing or four from the start."""
+        """Return the best fit of up to four Gaussians, grown from the published fit or fitted at once."""
         found = [self.joint(layout, self.densities(layout)[0], published.angles) for layout in EXTENDED]
         grown = published
         while len(grown.gaussians) < MOST:
@@ -256,9 +263,9 @@ class Fit:
         return min([*found, grown], key=lambda one: one.cost)
 
     def _grown(self, found: FitResult, most: int) -> Iterator[tuple[str, Float64, Float64]]:
-        """Yield starts with one more Gaussian, or one more on each side, at the point that lacks most."""
-        way = self._way(found.angles, self.at)[0]
-        lack = np.einsum("ij,ij->i", self.moves, way) - density(found.gaussians, self.at)[0]
+        """Yield starts with one more Gaussian, or a symmetric pair, at the point of the largest error."""
+        direction_ = self._directions_at(found.angles, self.at)[0]
+        lack = np.einsum("ij,ij->i", self.moves, direction_) - density(found.gaussians, self.at)[0]
         worst = int(np.argmax(self.weight * np.abs(lack)))
         high, (x, y, z) = lack[worst] / 2, self.at[worst]
         pair = len(found.gaussians) + 2 <= most
@@ -267,12 +274,12 @@ class Fit:
             more = (high, x, y, z, *root) if pair else (high, y, z, 1 / wide, 1 / wide, 0, 1 / wide)
             yield found.layout + ("p" if pair else "c"), np.append(found.bells, more), found.angles
 
-    def _way(self, x: Float64, at: Float64) -> tuple[Float64, Float64]:
+    def _directions_at(self, x: Float64, at: Float64) -> tuple[Float64, Float64]:
         """Return directions (n, 3) and their derivatives (n, 3, 20) by the free parameters."""
         alpha, by_alpha = angle(self.alpha(x[:7]), at)
         beta, by_beta = angle(self.beta(x[7:]), at)
-        way, turned, raised = direction(alpha, beta)
-        return way, np.concatenate(
+        direction_, turned, raised = direction(alpha, beta)
+        return direction_, np.concatenate(
             [
                 turned[:, :, None] * (by_alpha @ self.alpha.matrix)[:, None, :],
                 raised[:, :, None] * (by_beta @ self.beta.matrix)[:, None, :],
@@ -281,7 +288,7 @@ class Fit:
         )
 
     def _bells(self, layout: str) -> Iterator[float]:
-        """Return the starting Gaussians: centred on the moves, each narrower than the one before."""
+        """Yield the parameters of the initial Gaussians, which are centred on the displacements."""
         share = self.weight * self.length**2
         share = share / share.sum()
         middle = share @ self.at

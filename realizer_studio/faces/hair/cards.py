@@ -1,4 +1,4 @@
-"""Cards as they are made: strips along strands, what their vertices follow, and the picture they share."""
+"""Hair cards: strips along strands, the vertices that they follow, and their texture."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -11,27 +11,27 @@ from realizer.face.mesh_geometry import grid
 from realizer_studio.faces.hair.strands import unit
 from realizer_studio.faces.skin.atlas import HAIR
 
-ROUND = 0.25  # how far the normals of a card turn to its sides, as if it were a lock
+ROUND = 0.25  # lean of a card's normals to its sides, which makes it look like a lock
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
     """Cards at rest: c vertices and t triangles."""
 
-    places: Float64  # (c, 3) metres
-    ups: Float64  # (c, 3) unit normals
-    uv: Float64  # (c, 2) place in the maps
+    positions: Float64  # (c, 3) metres
+    normals: Float64  # (c, 3) unit normals
+    uv: Float64  # (c, 2) texture coordinates in the maps
     colours: Float64  # (c, 3) sRGB 0..255
     occlusion: Float64  # (c,) 0..1
     gloss: Float64  # (c,) 0..1
     triangles: Int32  # (t, 3)
-    skin: Int32  # (c, 3) vertices of the mesh that a vertex's root lies between; -1 for hair on the skull
-    shares: Float64  # (c, 3) of those in its root; they sum to 1, or are 0 for hair on the skull
+    skin: Int32  # (c, 3) vertices of the mesh around a vertex's root; -1 for hair on the skull
+    shares: Float64  # (c, 3) their weights; they sum to 1, or are 0 for hair on the skull
 
 
 def joined(patches: Sequence[Patch]) -> Patch:
-    """Return patches as one."""
-    counts = np.cumsum([0] + [len(patch.places) for patch in patches])
+    """Return the concatenation of patches."""
+    counts = np.cumsum([0] + [len(patch.positions) for patch in patches])
     values: dict[str, Any] = {
         field.name: np.concatenate([getattr(patch, field.name) for patch in patches])
         for field in fields(Patch)
@@ -42,8 +42,8 @@ def joined(patches: Sequence[Patch]) -> Patch:
 
 
 def ribbons(
-    places: Float64,
-    ups: Float64,
+    positions: Float64,
+    normals: Float64,
     width: Float64,
     strips: Any,
     colours: Float64,
@@ -56,22 +56,22 @@ def ribbons(
     Args:
         places, ups: (s, k, 3) along the lines, root first, and the normals of the surface there.
         width: (s, k) metres.
-        strips: (s,) of the picture.
+        strips: (s,) names in `STRIPS`.
         colours: (s, 3); occlusion: (s, k).
-        skin: vertices (s, 3) around the roots, and their shares (s, k, 3).
+        skin: vertices (s, 3) around the roots, and their weights (s, k, 3).
     """
-    count, rows = places.shape[:2]
-    ways = unit(np.gradient(places, axis=1))
-    aside = unit(np.cross(ways, ups))
-    ups = unit(np.cross(aside, ways))
+    count, rows = positions.shape[:2]
+    tangents = unit(np.gradient(positions, axis=1))
+    sideways = unit(np.cross(tangents, normals))
+    normals = unit(np.cross(sideways, tangents))
     sides = np.array([-0.5, 0.5])[:, None, None, None]
-    at = places + sides * aside * width[..., None]
-    tilt = unit(ups + sides * 2 * ROUND * aside)
-    # A narrow end shows less of the picture: hairs keep their direction and width.
+    at = positions + sides * sideways * width[..., None]
+    tilt = unit(normals + sides * 2 * ROUND * sideways)
+    # A narrow end shows less of the texture, so that hairs keep their direction and width.
     across = 0.5 + sides[..., 0] * (width / width.max(axis=1, keepdims=True))
     along = np.linspace(0, 1, rows)
-    uv = np.stack([place(strip, across[:, k], along) for k, strip in enumerate(strips)], axis=1)
-    # Vertices in the order line, row, side.
+    uv = np.stack([strip_uv(strip, across[:, k], along) for k, strip in enumerate(strips)], axis=1)
+    # The order of vertices is line, row, side.
     order = (1, 2, 0)
     sheet = grid(rows, 2)[:, ::-1]
     triangles = (sheet + (np.arange(count) * rows * 2)[:, None, None]).reshape(-1, 3)
@@ -96,32 +96,32 @@ LEVEL = 0.80  # mean brightness of a strand, 0..1
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """A part of the picture: what a card shows.
+    """A part of the texture that cards show.
 
-    A part is about as large as a card is in pictures: a smaller copy of a finer one is a grey square.
+    It is about as large as a card in pictures, because minified fine strands blur to grey.
     """
 
-    left: float  # 0..1 of the picture
+    left: float  # 0..1 of the texture
     top: float
     right: float
     bottom: float
-    strands: int  # how many
-    width: float  # of one, as a share of the strip's
-    sway: float = 0.06  # how far a strand strays, as a share of the strip's width
-    waves: float = 0.7  # how often
-    ends: float = 0.75  # the part of the height after which strands end
-    begins: float = 0.03  # the part of the height before which strands begin
-    tip: float = 0.3  # how far strands meet at the end, 0..1
-    whole: bool = False  # strands reach the strip's sides and its end
-    dashes: int = 0  # pieces that each strand is cut into; 0 is none
+    strands: int  # number of strands
+    width: float  # of a strand, as a share of the strip's
+    sway: float = 0.06  # amplitude of a strand's waves, as a share of the strip's width
+    waves: float = 0.7  # number of waves
+    ends: float = 0.75  # share of the height after which strands end
+    begins: float = 0.03  # share of the height before which strands begin
+    tip: float = 0.3  # convergence of strands at the end, 0..1
+    filled: bool = False  # strands reach the strip's sides and its end
+    dashes: int = 0  # pieces into which each strand is cut; 0 for uncut strands
 
 
 STRIPS: Mapping[str, Strip] = {
     "dense": Strip(0.00, 0.0, 0.13, 1.0, 50, 0.060, begins=0.24),
     "locks": Strip(0.13, 0.0, 0.26, 1.0, 34, 0.065, 0.10, 1.0, 0.55, 0.30, 0.5),
     "loose": Strip(0.26, 0.0, 0.38, 1.0, 17, 0.055, 0.12, 1.0, 0.45, 0.12, 0.5),
-    "cap": Strip(0.38, 0.0, 0.54, 1.0, 140, 0.034, 0.03, 0.6, 1.0, 0.40, 0.0, whole=True),
-    "crop": Strip(0.54, 0.0, 0.66, 1.0, 26, 0.050, 0.05, 2.0, 1.0, 0.10, 0.0, whole=True, dashes=22),
+    "cap": Strip(0.38, 0.0, 0.54, 1.0, 140, 0.034, 0.03, 0.6, 1.0, 0.40, 0.0, filled=True),
+    "crop": Strip(0.54, 0.0, 0.66, 1.0, 26, 0.050, 0.05, 2.0, 1.0, 0.10, 0.0, filled=True, dashes=22),
     "coils": Strip(0.66, 0.0, 0.80, 0.5, 26, 0.055, 0.14, 4.0, 0.50, 0.15, 0.2),
     "crew": Strip(0.66, 0.5, 0.80, 1.0, 30, 0.060, 0.10, 0.8, 0.45, 0.20, 0.5),
     "sparse": Strip(0.80, 0.0, 0.90, 0.35, 6, 0.060, 0.14, 0.8, 0.35, 0.30, 0.3),
@@ -131,12 +131,12 @@ STRIPS: Mapping[str, Strip] = {
     "brow": Strip(0.80, 0.70, 0.85, 0.95, 5, 0.09, 0.14, 0.4, 0.50, 0.25, 0.5),
     "lash": Strip(0.86, 0.70, 0.88, 0.95, 1, 0.45, 0.0, 0.0, 0.85, 0.0, 0.0),
 }
-MARGIN = 0.06  # share of a strip that stays empty at each side
-INSET = 0.004  # share of the picture's height that cards keep off the ends of a strip
+MARGIN = 0.06  # empty share of a strip at each side
+INSET = 0.004  # distance of cards from the ends of a strip, as a share of the texture's height
 
 
-def place(strip: str, across: Float64, along: Float64) -> Float64:
-    """Return u, v (..., 2) in the maps of places in a strip: across it and along its hairs, 0..1 each."""
+def strip_uv(strip: str, across: Float64, along: Float64) -> Float64:
+    """Return texture coordinates (..., 2) of positions across a strip and along its hairs, 0..1 each."""
     part = STRIPS[strip]
     x = part.left + (part.right - part.left) * np.asarray(across, float)
     y = part.top + INSET + (part.bottom - part.top - 2 * INSET) * np.asarray(along, float)
@@ -147,7 +147,7 @@ def place(strip: str, across: Float64, along: Float64) -> Float64:
 
 
 def hair_texture(size: int) -> UInt8:
-    """Return the picture (size, size, 4) sRGB with alpha: strands in grey, brightest 255, mean `LEVEL`."""
+    """Return the texture (size, size, 4) sRGB with alpha: strands in grey, brightest 255, mean `LEVEL`."""
     rng = np.random.default_rng(SEED)
     out = np.zeros((size, size, 4))
     out[..., :3] = LEVEL
@@ -161,11 +161,11 @@ def hair_texture(size: int) -> UInt8:
 
 
 def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator) -> Float64:
-    """Return the picture (height, width, 4) of a strip, 0..1."""
+    """Return the texture (height, width, 4) of a strip, 0..1."""
     v = (np.arange(height) + 0.5)[:, None] / height
     x = (np.arange(width) + 0.5) / width
-    tone, seen = np.full((height, width), LEVEL), np.zeros((height, width))
-    margin = 0.0 if strip.whole else MARGIN
+    tone, alpha = np.full((height, width), LEVEL), np.zeros((height, width))
+    margin = 0.0 if strip.filled else MARGIN
     wide = max(strip.width, 1.1 / width)
     for middle in rng.permutation(np.linspace(margin, 1 - margin, strip.strands + 2)[1:-1]):
         turn, size, bend = rng.uniform(0, 2 * np.pi), rng.uniform(0.4, 1), rng.uniform(-1, 1)
@@ -173,9 +173,9 @@ def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator) -> F
         to = 0.5 + (middle - 0.5) * (1 - strip.tip * v**2)
         centre = to + (sway + strip.sway * 0.5 * bend * v) * np.minimum(1, 4 * v + 0.3)
         centre = centre.clip(margin + wide / 2, 1 - margin - wide / 2)
-        begin = strip.begins * rng.uniform(0, 1) ** (1.0 if strip.whole else 2.0)
-        end = 1.1 if strip.whole else strip.ends + (1 - strip.ends) * rng.uniform(0, 1)
-        # Thin at the root and at the tip.
+        begin = strip.begins * rng.uniform(0, 1) ** (1.0 if strip.filled else 2.0)
+        end = 1.1 if strip.filled else strip.ends + (1 - strip.ends) * rng.uniform(0, 1)
+        # A strand is thin at its root and tip.
         taper = np.clip((end - v) / 0.30, 0, 1) ** 0.6 * np.clip(0.35 + (v - begin) / 0.16, 0, 1)
         on = np.clip((v - begin) / 0.08, 0, 1) * (v < end)
         if strip.dashes:
@@ -186,5 +186,5 @@ def _strip(strip: Strip, height: int, width: int, rng: np.random.Generator) -> F
         # A strand is round: brighter along its middle.
         light = light * (0.90 + 0.16 * np.clip(1 - np.abs(x - centre) / half, 0, 1))
         tone += cover * (light - tone)
-        seen = np.maximum(seen, cover)
-    return np.stack([tone, tone, tone, seen], axis=-1)
+        alpha = np.maximum(alpha, cover)
+    return np.stack([tone, tone, tone, alpha], axis=-1)

@@ -1,4 +1,4 @@
-"""The hair of a face: the cap on its scalp, the cards on that, and thin ones along the hairline."""
+"""The hair of a face: a cap on the scalp, cards over it, and thin cards along the hairline."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float64, Int32
-from realizer_studio.faces.hair.cards import LEVEL, Patch, joined, place, ribbons
+from realizer_studio.faces.hair.cards import LEVEL, Patch, joined, ribbons, strip_uv
 from realizer_studio.faces.hair.strands import Strands, edge, grow, roots, unit
 from realizer_studio.faces.hair.style import GREY, Style, colour_of
 from realizer_studio.faces.parts import smooth
 from realizer_studio.faces.person.scalp import Scalp
 
 BORDER, SHORTEST = 3, 0.004  # segments of cards at the hairline; m of the shortest card
-FRINGE = 0.007  # m that cards at the hairline may reach beyond it
-UNDER = 0.35  # layers below that are what lies under the others
-CAP = 0.0011  # m that the cap lies above the skin
-SOFT = 0.016  # m from the hairline in which the cap gets dense; the part of its picture for that
-FADE = 0.42
-TURN, AROUND = 0.012, 0.085  # m that the cap's picture is wide; radius of the head
+FRINGE = 0.007  # m by which cards at the hairline may extend beyond it
+UNDER = 0.35  # layers below that have the texture of undermost hair
+CAP = 0.0011  # m; height of the cap above the skin
+SOFT = 0.016  # m from the hairline over which the cap gets dense
+FADE = 0.42  # the share of its texture for that
+TURN, AROUND = 0.012, 0.085  # m; width of the cap's texture, and radius of the head
 DEEP = 0.13
 
 
@@ -27,7 +27,7 @@ def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any, rng: Any) ->
     """Return all cards of the hair.
 
     Args:
-        scalp: over the skin that is drawn; triangles: (m, 3) of that skin.
+        scalp: of the subdivided skin; triangles: (m, 3) of that skin.
         colour: sRGB.
     """
     parts = [cap(scalp, triangles, style, colour)]
@@ -41,8 +41,8 @@ def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any, rng: Any) ->
 
 
 def tints(style: Style, colour: Any, count: int, rng: Any) -> Float64:
-    """Return colours of cards (count, 3), sRGB: those of hair, some turned grey."""
-    # A card is a lock of hundreds of hairs: each lock has white ones among its dark ones.
+    """Return random colours of cards (count, 3), sRGB, with a share of grey."""
+    # A card is a lock of hundreds of hairs, dark and white ones.
     white = style.grey + 0.22 * rng.uniform(-1, 1, (count, 1)) * (1 - abs(2 * style.grey - 1))
     out = np.array(colour, float) * (1 - white) + GREY * white
     out = out * (1 + style.contrast * rng.uniform(-1, 1, (count, 1)))
@@ -50,17 +50,17 @@ def tints(style: Style, colour: Any, count: int, rng: Any) -> Float64:
 
 
 def cap(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
-    """Return the drawn skin's own triangles under the hair, a little above it, in the hair's colour."""
+    """Return a copy of the skin's triangles under the hair, a little above them, in the hair's colour."""
     inside = edge(scalp, style, scalp.at)
     keep = triangles[(inside[triangles] > -0.001).any(axis=1) & (inside[triangles] > -0.012).all(axis=1)]
     used, across, corners = _wrapped(scalp, keep)
-    at, ups, inside = scalp.at[used], scalp.ups[used], inside[used]
+    at, normals, inside = scalp.at[used], scalp.normals[used], inside[used]
     soft, full = FADE * np.maximum(inside, -0.004) / SOFT, FADE + (1 - FADE) * (inside - SOFT) / DEEP
     count = len(used)
     return Patch(
-        at + ups * CAP * smooth(inside, -0.006, 0.006)[:, None],
-        ups,
-        place(style.cap, across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
+        at + normals * CAP * smooth(inside, -0.006, 0.006)[:, None],
+        normals,
+        strip_uv(style.cap, across, np.clip(np.where(inside < SOFT, soft, full), 0, 1)),
         np.repeat(np.clip(colour_of(style, colour) / LEVEL, 0, 255)[None], count, 0),
         style.depth * 0.5 + (1 - style.depth * 0.5) * smooth(inside, 0.022, 0.0),
         np.full(count, style.gloss * 0.5),
@@ -71,19 +71,19 @@ def cap(scalp: Scalp, triangles: Int32, style: Style, colour: Any) -> Patch:
 
 
 def _wrapped(scalp: Scalp, triangles: Int32) -> tuple[Int32, Float64, Int32]:
-    """Return the skin's vertex of each vertex (c,), its place across the picture, 0..1, and triangles (m, 3).
+    """Return the skin's vertex of each vertex (c,), its u in the texture, 0..1, and triangles (m, 3).
 
-    The picture repeats around the head; a triangle shows a piece of it that is not cut.
+    The texture repeats around the head; vertices are doubled where a triangle would cross its edge.
     """
     at = scalp.at[triangles]
     turn = np.arctan2(at[..., 0], at[..., 2] - scalp.middle[2]) / (2 * np.pi)
-    turn -= np.rint(turn - turn[:, :1])  # behind the head it jumps
+    turn -= np.rint(turn - turn[:, :1])  # the angle wraps behind the head
     across = turn * round(2 * np.pi * AROUND / TURN)
     middle = across.mean(axis=1, keepdims=True)
-    off = across - middle
-    off *= np.minimum(1, 0.45 / np.abs(off).max(axis=1, keepdims=True))
-    low, high = -off.min(axis=1, keepdims=True), 1 - off.max(axis=1, keepdims=True)
-    steps = np.rint((np.clip(middle % 1, low, high) + off) * 200).astype(np.int64)
+    offset = across - middle
+    offset *= np.minimum(1, 0.45 / np.abs(offset).max(axis=1, keepdims=True))
+    low, high = -offset.min(axis=1, keepdims=True), 1 - offset.max(axis=1, keepdims=True)
+    steps = np.rint((np.clip(middle % 1, low, high) + offset) * 200).astype(np.int64)
     keys, corners = np.unique(triangles * 1000 + steps, return_inverse=True)
     return keys // 1000, keys % 1000 / 200, corners.reshape(-1, 3).astype(np.int32)
 
@@ -102,31 +102,33 @@ def _locks(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
     names = np.where(layer < UNDER, style.under, rng.choice(style.strips, count))
     near = edge(scalp, style, at) < rng.uniform(0.004, 0.016, count)
     names = np.where(near, style.edge, names)
-    return _shown(lines, width, light, names, tints(style, colour, count, rng), style.gloss)
+    return _visible_cards(lines, width, light, names, tints(style, colour, count, rng), style.gloss)
 
 
 def _border(scalp: Scalp, style: Style, colour: Any, rng: Any) -> Patch:
-    """Return cards of few hairs along the hairline, so that it has no edge."""
-    # Hair that hangs lies along the hairline: beyond it, it would float on the forehead.
+    """Return cards of few hairs along the hairline, which soften its edge."""
+    # Hanging hair lies along the hairline: beyond it, it would float on the forehead.
     low, least = (0.002, -0.002) if style.heavy else (-0.004, -FRINGE)
     at = roots(scalp, style, style.border, low, 0.008, rng)
     count = len(at)
     layer, length = rng.uniform(0.1, 0.6, count), style.border_length * rng.uniform(0.5, 1.2, count)
     lines = grow(scalp, style, at, layer, length, BORDER, rng)
-    inside = edge(scalp, style, lines.places.reshape(-1, 3)).reshape(count, -1).min(axis=1)
+    inside = edge(scalp, style, lines.positions.reshape(-1, 3)).reshape(count, -1).min(axis=1)
     lines = replace(lines, length=np.where(inside < least, 0, lines.length))
     width = 0.0048 * rng.uniform(0.7, 1.2, (count, 1)) * np.linspace(1, 0.8, BORDER + 1)
     light = np.full((count, BORDER + 1), 0.9)
-    return _shown(
+    return _visible_cards(
         lines, width, light, rng.choice(style.thin, count), tints(style, colour, count, rng), style.gloss
     )
 
 
-def _shown(lines: Strands, width: Float64, light: Float64, names: Any, tint: Float64, gloss: float) -> Patch:
-    """Return cards along the lines that have a length."""
+def _visible_cards(
+    lines: Strands, width: Float64, light: Float64, names: Any, tint: Float64, gloss: float
+) -> Patch:
+    """Return cards along the lines that are not too short."""
     good = lines.length > SHORTEST
     return ribbons(
-        lines.places[good], lines.ups[good], width[good], names[good], tint[good], light[good], gloss
+        lines.positions[good], lines.normals[good], width[good], names[good], tint[good], light[good], gloss
     )
 
 
@@ -134,14 +136,14 @@ ROWS, TURNS, RINGS = 6, 26, 7
 
 
 def bun(scalp: Scalp, style: Style, tints: Callable[[int], Float64], rng: Any) -> Patch:
-    """Return cards that wind around a flattened ball at the end of the parting."""
+    """Return the cards of a bun, which wind around a flattened ball at the end of the parting."""
     pole = unit(np.array(style.parting[0], float))
     radii = np.array(style.bun, float)
     crest = scalp.skull(pole[None])[0]
     side = unit(np.cross([0, 1.0, 0], pole))
     frame = np.stack([side, np.cross(pole, side), pole])
     centre = crest + pole * radii[2] * 0.72
-    places, ups, widths, lights = [], [], [], []
+    positions, normals, widths, lights = [], [], [], []
     s = np.linspace(0, 1, ROWS + 1)
     for ring in range(RINGS):
         polar = np.pi * (0.10 + 0.78 * (ring + 0.5) / RINGS)
@@ -151,12 +153,12 @@ def bun(scalp: Scalp, style: Style, tints: Callable[[int], Float64], rng: Any) -
             lean = polar + (s - 0.5) * rng.uniform(-0.35, 0.75)
             lock = 1 + 0.06 * rng.uniform(-1, 1) + 0.07 * np.sin(np.pi * s) - 0.05
             ball = np.stack([np.sin(lean) * np.cos(turn), np.sin(lean) * np.sin(turn), np.cos(lean)], 1)
-            places.append(centre + (ball * radii * lock[:, None]) @ frame)
-            ups.append(unit((ball / radii) @ frame))
+            positions.append(centre + (ball * radii * lock[:, None]) @ frame)
+            normals.append(unit((ball / radii) @ frame))
             widths.append(radii[0] * 0.42 * rng.uniform(0.7, 1.2) * (0.6 + 0.4 * np.sin(np.pi * s)))
             lights.append((0.55 + 0.45 * np.sin(np.pi * s)) * rng.uniform(0.7, 1.0))
-    number = len(places)
+    number = len(positions)
     return ribbons(
-        np.array(places), np.array(ups), np.array(widths), ["dense"] * number, tints(number),
+        np.array(positions), np.array(normals), np.array(widths), ["dense"] * number, tints(number),
         np.array(lights), style.gloss,
     )  # fmt: skip

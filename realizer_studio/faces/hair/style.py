@@ -16,7 +16,7 @@ Table = list[list[float]]
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """Figures of a way to wear hair, as `realizer/tables/hair.toml` explains them."""
+    """The numbers of a hair style; `realizer/tables/hair.toml` explains them."""
 
     line: Table
     rise: Table
@@ -57,23 +57,23 @@ class Style:
 
 
 def style_of(table: Mapping[str, Any]) -> Style:
-    """Return the style that a recipe's [hair] names, with its changes.
+    """Return the style in a recipe's [hair], with its changes.
 
     Raises:
-        FaceError: no such style, or no such figure.
+        FaceError: an unknown style or key.
     """
-    known = toml_table("hair.toml")
+    table_of_styles = toml_table("hair.toml")
     name = table.get("style", "short")
-    if not isinstance(name, str) or name not in known["styles"]:
-        raise FaceError(f"hair: style: wanted one of {', '.join(known['styles'])}, got {name!r}")
-    own = {key: value for key, value in table.items() if key != "style"}
+    if not isinstance(name, str) or name not in table_of_styles["styles"]:
+        raise FaceError(f"hair: style: wanted one of {', '.join(table_of_styles['styles'])}, got {name!r}")
+    changes = {key: value for key, value in table.items() if key != "style"}
     names = [field.name for field in fields(Style)]
-    for key in own:
+    for key in changes:
         if key not in names:
             raise FaceError(f"hair: wanted one of style, {', '.join(names)}, got {key!r}")
-    return Style(**(known["plain"] | known["styles"][name] | own))
+    return Style(**(table_of_styles["plain"] | table_of_styles["styles"][name] | changes))
 
 
 def colour_of(style: Style, colour: Any) -> Float64:
-    """Return the mean colour (3,) of hair that has white strands among its own, sRGB."""
+    """Return the mean colour (3,) of hair and its white strands, sRGB."""
     return np.asarray(np.array(colour, float) * (1 - style.grey) + GREY * style.grey)

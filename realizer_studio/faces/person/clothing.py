@@ -13,13 +13,13 @@ from realizer.tables import toml_table
 from realizer_studio.faces.decimate import decimate
 from realizer_studio.faces.parts import Part, Submesh, smooth
 
-COLLAR = 0.486  # of the face's height, hairline to chin: how far below the chin the collar is in front
-TILT = 0.42  # of the plane of the collar, which rises backwards
-POINT = 0.045  # m from the middle that a pointed collar reaches its full height
+COLLAR = 0.486  # heights of the face, hairline to chin, from the chin down to the front of the collar
+TILT = 0.42  # slope of the plane of the collar, which rises backwards
+POINT = 0.045  # m; half width of the point of a collar
 
 
 def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, point: float = 0.0) -> Float64:
-    """Return how far points lie below the neckline, in metres.
+    """Return the distance of points below the neckline in metres.
 
     Args:
         chin: (3,) metres; face: metres from hairline to chin.
@@ -31,38 +31,38 @@ def under_collar(at: Float64, chin: Float64, face: float, low: float = 0.0, poin
 
 
 def shirt(skin: Submesh, base: Float64, low: Float64, colour: list[float]) -> Part:
-    """Return a shirt: the body below the neckline, lifted. `low`: (n,) metres of its vertices below that."""
-    some = (low > -0.03)[skin.triangles].any(axis=1)
-    low = low[np.unique(skin.triangles[some])]
-    piece = skin.with_triangles(some)
+    """Return a shirt, which is the lifted body below the neckline; `low`: (n,) as from `under_collar`."""
+    chosen = (low > -0.03)[skin.triangles].any(axis=1)
+    low = low[np.unique(skin.triangles[chosen])]
+    piece = skin.with_triangles(chosen)
     piece, mix = piece.clipped(low)
     low = np.asarray(mix @ low)
     at = piece.positions(base)
-    ups = vertex_normals(at, piece.triangles)
+    normals = vertex_normals(at, piece.triangles)
     thick = 0.0028 + 0.0016 * smooth(low, 0.010, 0.004)
-    piece = piece.moved(ups * thick[:, None])
+    piece = piece.moved(normals * thick[:, None])
     tint = np.repeat(np.array([colour], float), len(piece), 0)
     tint *= (1 - 0.22 * smooth(low, 0.012, 0.009))[:, None]
     return Part("shirt", piece, piece.positions(base), piece.triangles, tint, np.zeros(len(piece)))
 
 
-# Baked light under which nothing is ever seen, and metres that surfaces may change by where vertices go.
+# Baked light below which a surface is invisible, and metres by which decimation may change surfaces.
 HIDDEN = 0.27
-UNSEEN, PLAIN, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
+UNSEEN, EVEN, BUST, CLOTH, DEEP_CLOTH = 0.003, 0.0006, 0.0005, 0.0008, 0.003
 
 
-def decimate_hidden(part: Part, keep: Any, plain: Any, chin: float, floor: float) -> Part:
-    """Return skin, shirt or tongue with fewer vertices where hidden, or evenly curved and far from the face.
+def decimate_hidden(part: Part, keep: Any, even: Any, chin: float, floor: float) -> Part:
+    """Return a part with fewer vertices where it is hidden, evenly curved or far from the face.
 
     Args:
         part: with baked occlusion.
-        keep: (n,) vertices that stay; plain: (n,) those of ears and scalp.
+        keep: (n,) vertices that stay; even: (n,) vertices of ears and scalp.
         chin, floor: metres, heights of the chin and of the bust's lower end.
     """
     at, light = part.vertices, np.asarray(part.occlusion)
     if part.name == "skin":
         tolerance = np.where(light < HIDDEN, UNSEEN, 0)
-        tolerance = np.maximum(tolerance, np.where(plain, PLAIN, 0))
+        tolerance = np.maximum(tolerance, np.where(even, EVEN, 0))
         tolerance = np.maximum(tolerance, np.where(at[:, 1] < chin - 0.012, BUST, 0))
         pairs, count = edges_of(part.triangles)
         tolerance[pairs[count == 1].ravel()] = 0
@@ -76,12 +76,12 @@ def decimate_hidden(part: Part, keep: Any, plain: Any, chin: float, floor: float
 AROUND, RIM, TEMPLE = 6, 28, 9  # vertices around a tube, along a rim and along a temple
 VERTEX_DISTANCE = 0.013  # m from the cornea to the lens
 CLEAR = 0.0022  # m between a temple and the skin
-NEAR = 0.007  # m around a temple's point where the skin is looked for
+NEAR = 0.007  # m; the radius in which skin is searched around a point of a temple
 HOOK = np.array([0.0, -0.020, -0.013])  # m from the top of the ear to the end of the temple
 
 
 def glasses_of(table: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the figures of glasses, for [glasses] of a recipe; None if it is empty.
+    """Return the numbers of a pair of glasses from [glasses] of a recipe; None if it is empty.
 
     Raises:
         FaceError: no such style or figure, or a value out of range.
@@ -91,15 +91,15 @@ def glasses_of(table: Mapping[str, Any]) -> dict[str, Any] | None:
     styles = toml_table("glasses.toml")
     if (style := table.get("style")) not in styles:
         raise FaceError(f"glasses: style: wanted one of {', '.join(styles)}, got {style!r}")
-    plain, own = styles[style], {key: value for key, value in table.items() if key != "style"}
-    for key, value in own.items():
-        if key not in plain:
-            hint = did_you_mean(similar(key, plain, 1))
-            raise FaceError(f"glasses: wanted one of style, {', '.join(plain)}, got {key!r}{hint}")
+    defaults, changes = styles[style], {key: value for key, value in table.items() if key != "style"}
+    for key, value in changes.items():
+        if key not in defaults:
+            hint = did_you_mean(similar(key, defaults, 1))
+            raise FaceError(f"glasses: wanted one of style, {', '.join(defaults)}, got {key!r}{hint}")
         kind = list if key == "colour" else (int, float)
         if not isinstance(value, kind) or isinstance(value, bool):
-            raise FaceError(f"glasses: {key}: wanted {plain[key]!r} or the like, got {value!r}")
-    return {**plain, **own}
+            raise FaceError(f"glasses: {key}: wanted {defaults[key]!r} or the like, got {value!r}")
+    return {**defaults, **changes}
 
 
 def glasses(
@@ -148,7 +148,7 @@ def _temple(hinge: Float64, ear: Float64, side: float, skin: Float64) -> Float64
         near = (np.abs(skin[:, 1:] - point[1:]) < NEAR).all(axis=1) & (skin[:, 0] * side > 0)
         if near.any():
             point[0] = side * max(side * point[0], float(np.abs(skin[near, 0]).max()) + CLEAR)
-    # Ears would push the last points out: those lie between ear and head.
+    # The last points lie between ear and head, so the ear must not push them out.
     path[-2:, 0] = ear[0]
     return np.vstack([path, path[-1] + HOOK])
 
@@ -156,15 +156,15 @@ def _temple(hinge: Float64, ear: Float64, side: float, skin: Float64) -> Float64
 def _tube(path: Float64, radius: float, closed: bool = False) -> tuple[Float64, Any]:
     """Return vertices and triangles of a tube of that radius about a path (k, 3), with open ends."""
     ends = (path[-1], path[0]) if closed else (2 * path[0] - path[1], 2 * path[-1] - path[-2])
-    whole = np.vstack([ends[0], path, ends[1]])
-    along = whole[2:] - whole[:-2]
+    extended = np.vstack([ends[0], path, ends[1]])
+    along = extended[2:] - extended[:-2]
     along /= np.linalg.norm(along, axis=1)[:, None]
     across = np.cross(along, [0.0, 0.0, 1.0] if closed else [0.0, 1.0, 0.0])
     across /= np.linalg.norm(across, axis=1)[:, None]
     up = np.cross(across, along)
-    turn = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
+    angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)
     rings = path[:, None] + radius * (
-        np.cos(turn)[None, :, None] * across[:, None] + np.sin(turn)[None, :, None] * up[:, None]
+        np.cos(angle)[None, :, None] * across[:, None] + np.sin(angle)[None, :, None] * up[:, None]
     )
     points = np.concatenate([rings, rings[:1]]) if closed else rings
     sheet = grid(len(points), AROUND, closed=True)

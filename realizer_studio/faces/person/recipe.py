@@ -1,4 +1,6 @@
-"""The recipe.toml of a person: sliders, or shape targets and colours; hair and look."""
+"""The recipe.toml of a person: a reader and its checks.
+
+A recipe has sliders, or shape targets and colours, and tables for hair, look and glasses."""
 
 import json
 from collections.abc import Mapping
@@ -25,7 +27,7 @@ TABLES = ("person", "targets", "colours", "hair", "look", "glasses")
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Figures of how a person looks, as `realizer/tables/look.toml` explains them."""
+    """The numbers of a person's look; `realizer/tables/look.toml` explains them."""
 
     brow_thick: float
     brow_low: float
@@ -52,29 +54,29 @@ class Recipe:
 
     description: str  # a sentence about them, for lists of faces
     targets: dict[str, float]  # shape target -> weight 0..1; `*` in a name stands for both sides
-    colours: dict[str, list[float]]  # what for -> sRGB 0..255
-    hair: dict[str, Any] = field(default_factory=dict)  # the style of the hair, and the figures it changes
-    # Figures of `Appearance` that differ from the plain ones.
+    colours: dict[str, list[float]]  # name of `COLOURS` -> sRGB 0..255
+    hair: dict[str, Any] = field(default_factory=dict)  # the style of the hair, and numbers that it changes
+    # Numbers of `Appearance` that differ from the defaults.
     look: dict[str, Any] = field(default_factory=dict)
-    # A style of `realizer/tables/glasses.toml`, and the figures it changes; empty for none.
+    # A style of `realizer/tables/glasses.toml`, and numbers that it changes; empty for no glasses.
     glasses: dict[str, Any] = field(default_factory=dict)
 
 
 def read_recipe(path: Path, data: Path) -> Recipe:
-    """Read a recipe from a file. What its sliders ([person]) give, its other tables may change.
+    """Read a recipe from a file; its other tables override the values of the sliders in [person].
 
-    Without [person], [targets] and [colours] it is the person whose sliders have their defaults.
+    Without [person], [targets] and [colours], all sliders have their defaults.
 
     Args:
-        data: the folder of shape targets that its names are looked up in.
+        data: the folder of shape targets.
 
     Raises:
-        FaceError: the file is missing or not TOML, or has faults: all are listed, each with key and reason.
+        FaceError: the file is missing or not TOML, or has faults; the text lists all, with key and reason.
     """
     with face_errors(path, "a recipe (copy the one of another face and change it)"):
         raw = parse_toml(path.read_text("utf-8"))
-    known = ("says", *TABLES)
-    faults = [f"wanted one of {', '.join(known)}, got {key!r}" for key in raw if key not in known]
+    keys = ("says", *TABLES)
+    faults = [f"wanted one of {', '.join(keys)}, got {key!r}" for key in raw if key not in keys]
     tables: dict[str, dict[str, Any]] = {}
     for name in TABLES:
         tables[name] = raw.get(name, {})
@@ -87,10 +89,10 @@ def read_recipe(path: Path, data: Path) -> Recipe:
     if not wrong and ("person" in raw or not {"targets", "colours"} & raw.keys()):
         for name, values in person_tables(person).items():
             tables[name] = {**values, **tables[name]}
-    says = raw.get("says", description_of(person))
-    if not isinstance(says, str) or not says.strip():
-        faults.append(f"says: wanted a sentence about the person, got {says!r}")
-    if not wrong:  # else targets and colours are missing because of that
+    description = raw.get("says", description_of(person))
+    if not isinstance(description, str) or not description.strip():
+        faults.append(f"says: wanted a sentence about the person, got {description!r}")
+    if not wrong:  # otherwise targets and colours are missing because of the sliders
         faults += _target_faults(tables["targets"], data)
         faults += _colour_faults(tables["colours"])
     for reader, name in ((style_of, "hair"), (appearance_of, "look"), (glasses_of, "glasses")):
@@ -100,14 +102,14 @@ def read_recipe(path: Path, data: Path) -> Recipe:
             faults.append(str(error))
     if faults:
         raise FaceError("\n".join(f"{path}: {fault}" for fault in faults))
-    return Recipe(says, **tables)
+    return Recipe(description, **tables)
 
 
 def appearance_of(table: Mapping[str, Any]) -> Appearance:
-    """Return the plain look with the changes of a recipe's [look].
+    """Return the default look with the changes of a recipe's [look].
 
     Raises:
-        FaceError: no such figure, or not a number.
+        FaceError: an unknown key, or a value that is no number.
     """
     names = [field.name for field in fields(Appearance)]
     for key, value in table.items():
@@ -115,12 +117,12 @@ def appearance_of(table: Mapping[str, Any]) -> Appearance:
             raise FaceError(f"look: wanted one of {', '.join(names)}, got {key!r}")
         if not is_number(value):
             raise FaceError(f"look: {key}: wanted a number, got {value!r}")
-    plain = toml_table("look.toml")
-    return Appearance(**{name: float(table.get(name, plain[name])) for name in names})
+    defaults = toml_table("look.toml")
+    return Appearance(**{name: float(table.get(name, defaults[name])) for name in names})
 
 
 def recipe_text(tables: Mapping[str, Any]) -> str:
-    """Return a recipe as TOML: `says`, then a table after the other."""
+    """Return a recipe as TOML: `says`, then its tables."""
     lines = [f"says = {json.dumps(tables['says'], ensure_ascii=False)}"]
     for name, table in tables.items():
         if isinstance(table, Mapping):
@@ -135,14 +137,14 @@ def _toml(value: Any) -> str:
 
 
 def _target_faults(targets: Mapping[str, Any], data: Path) -> list[str]:
-    known = makehuman.target_names(data)
+    names = makehuman.target_names(data)
     faults = []
     if not any(str(name).startswith("macrodetails/") for name in targets):
         faults.append("targets: wanted at least one of macrodetails/..., got none")
     for name, weight in targets.items():
-        if name not in known:
+        if name not in names:
             faults.append(
-                f"targets: {name}: no such shape target{did_you_mean(similar(name, known, 1, 0.4))}"
+                f"targets: {name}: no such shape target{did_you_mean(similar(name, names, 1, 0.4))}"
             )
         if not is_number(weight) or not 0 <= weight <= 1:
             faults.append(f"targets: {name}: wanted a weight 0..1, got {weight!r}")

@@ -25,25 +25,25 @@ def build_from_photographs(
     folder: Path,
     data: Path,
     *,
-    told: Mapping[str, Any],
+    sliders: Mapping[str, Any],
     hair: str | None = None,
     progress: Callable[[str], None] = print,
 ) -> Path:
-    """Build a face folder of two photographs of a person; nothing is written unless all of it is done.
+    """Build a face folder from two photographs of a person; an error leaves no files.
 
     Args:
         front, side: pictures of a face at rest, the second one turned by 30 to 60 degrees or by 90.
         folder: the folder to write, which must not exist, or be empty.
         data: the CC0 MakeHuman data, as for `build_face`.
-        told: sliders of a recipe that are known, such as {"age": 40, "eyes": "blue"}.
-        hair: a style of hair; None is the likeliest.
-        progress: called with what is done next, a few words.
+        sliders: fixed sliders of the recipe, such as {"age": 40, "eyes": "blue"}.
+        hair: a style of hair; None for the likeliest.
+        progress: called with the name of the next step.
 
     Returns:
         The folder.
 
     Raises:
-        FaceError: a photograph, the data or a slider is of no use; or the folder has something already.
+        FaceError: a photograph, the data or a slider cannot be used, or the folder is not empty.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise FaceError(f"{folder}: there is something already; wanted a new folder (-o)")
@@ -52,19 +52,19 @@ def build_from_photographs(
     views = read_views(front, side)
     progress("fit the recipe")
     fit = fit_person(
-        *views, data, {key: value for key, value in told.items() if key in ("age", "sex", "people")}
+        *views, data, {key: value for key, value in sliders.items() if key in ("age", "sex", "people")}
     )
-    tables = recipe_of(views[0], fit.person, told, hair)
-    at = person_of(data, person_targets(tables["person"])).ground.at
+    tables = recipe_of(views[0], fit.person, sliders, hair)
+    at = person_of(data, person_targets(tables["person"])).figure.at
     warp = warp_of(fit, at)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".photo-", dir=folder.parent) as temporary:
-        made = Path(temporary) / folder.name
-        made.mkdir()
-        (made / RECIPE).write_text(recipe_text(tables), "utf-8")
-        warp.write(made)
-        build_face(folder.name, data, made, progress, Photographs(warp, Painter(fit)))
+        draft = Path(temporary) / folder.name
+        draft.mkdir()
+        (draft / RECIPE).write_text(recipe_text(tables), "utf-8")
+        warp.write(draft)
+        build_face(folder.name, data, draft, progress, Photographs(warp, Painter(fit)))
         if folder.exists():
             folder.rmdir()
-        shutil.move(made, folder)
+        shutil.move(draft, folder)
     return folder

@@ -1,4 +1,4 @@
-"""What a photograph tells of colours and hair, as tables of a recipe."""
+"""Colours and hair of a photograph, as tables of a recipe."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,26 +12,26 @@ from realizer_studio.faces.person.sliders import person_tables
 from realizer_studio.faces.photo.views import View
 
 CHEEKS = (50, 280, 205, 425, 101, 330, 118, 347, 151, 9)  # landmarks on plain skin
-TOP, CHIN, JAW, ASIDE, TEMPLES = 10, 152, (132, 361), (234, 454), (127, 356)
-# Light that a picture shows beside the skin's own colour, by channel, as measured on drawings of our faces.
-SHOWN = np.array([0.97, 0.91, 0.83])
-ABOVE = (0.10, 0.16, 0.22)  # heights of the face above its uppermost landmark at which hair is looked for
+TOP, CHIN, JAW, SIDES, TEMPLES = 10, 152, (132, 361), (234, 454), (127, 356)
+# Ratio of colours in a picture to the skin's albedo, by channel, measured on renderings of shipped faces.
+REFLECTED = np.array([0.97, 0.91, 0.83])
+ABOVE = (0.10, 0.16, 0.22)  # heights of the face above its uppermost landmark where hair is sampled
 BESIDE = (0.18, 0.25, 0.32)  # widths of the face beside the jaw
-ALIKE = 0.35  # distance of the logarithms of colours; those further apart are not of the same thing
-TEMPLE = 0.06  # heights of the face above the landmark at the temple at which a rim of hair is looked for
-PATCH = 4  # pixels around a place
-ON_SKIN = ("skin", "blush", "lips", "corner")  # colours that go with the skin's
+ALIKE = 0.35  # largest distance of the logarithms of colours of one material
+TEMPLE = 0.06  # heights of the face above the landmark at the temple where a rim of hair is sampled
+PATCH = 4  # pixels around a sampled position
+ON_SKIN = ("skin", "blush", "lips", "corner")  # colours that are scaled with the skin's
 
 
 def recipe_of(
-    front: View, person: Mapping[str, Any], told: Mapping[str, Any], hair: str | None
+    front: View, person: Mapping[str, Any], fixed: Mapping[str, Any], hair: str | None
 ) -> dict[str, Any]:
-    """Return the tables of a recipe: sliders, colours of skin, hair and eyes, and a way to wear hair.
+    """Return the tables of a recipe: sliders, colours of skin, hair and eyes, and a hair style.
 
     Args:
         person: the sliders of the shape.
-        told: sliders that are known.
-        hair: a style of `realizer/tables/hair.toml`; None is the likeliest.
+        fixed: sliders with fixed values.
+        hair: a style of `realizer/tables/hair.toml`; None for the likeliest.
     """
     assert front.points is not None
     table, points = toml_table("person.toml"), front.points
@@ -44,13 +44,13 @@ def recipe_of(
     tone = int(np.linalg.norm(fine - skin, axis=1).argmin())
     up = points[TOP] - points[CHIN]
     found = np.median([_colour(pixels, points[TOP] + share * up) for share in ABOVE], axis=0)
-    rim = _rim(pixels, points, skin) if _apart(found, skin) < ALIKE else None
-    seen = {
+    rim = _rim(pixels, points, skin) if _colour_difference(found, skin) < ALIKE else None
+    found_sliders = {
         "skin": round(tone / 199, 3),
         "hair": _nearest(found if rim is None else rim, _hairs()),
         "eyes": _nearest(_iris(pixels, front), _eyes()),
     }
-    sliders = {**person, **seen, **told}
+    sliders = {**person, **found_sliders, **fixed}
     tables = person_tables(sliders)
     share = linear(skin) / linear(fine[tone])
     colours = {
@@ -61,7 +61,7 @@ def recipe_of(
         "says": f"A face made of two photographs, with {sliders['hair']} hair",
         "person": sliders,
         "colours": {name: colour.tolist() for name, colour in colours.items()},
-        # The colour of grey hair is seen already.
+        # The sampled colour includes grey hair.
         "hair": {"style": style, "grey": 0.0},
     }
 
@@ -74,50 +74,52 @@ def _eyes() -> dict[str, Any]:
     return {name: row["colours"][1] for name, row in toml_table("person.toml")["eye_colours"].items()}
 
 
-def _colour(pixels: Float64, place: Any) -> Float64:
-    """Return the own colour (3,), sRGB 0..255, of what is seen about a place."""
-    x, y = np.clip(np.rint(place).astype(int), PATCH, np.array(pixels.shape[1::-1]) - PATCH - 1)
+def _colour(pixels: Float64, position: Any) -> Float64:
+    """Return the albedo (3,), sRGB 0..255, around a position."""
+    x, y = np.clip(np.rint(position).astype(int), PATCH, np.array(pixels.shape[1::-1]) - PATCH - 1)
     around = pixels[y - PATCH : y + PATCH + 1, x - PATCH : x + PATCH + 1].reshape(-1, 3)
-    return np.asarray(255.0 * srgb(linear(np.median(around, axis=0)) / SHOWN))
+    return np.asarray(255.0 * srgb(linear(np.median(around, axis=0)) / REFLECTED))
 
 
 def _iris(pixels: Float64, front: View) -> Float64:
-    """Return the colour of both irises beside and below the pupils, where lids give no shade."""
+    """Return the colour of both irises beside and below the pupils, outside the shadow of the lids."""
     turn = np.radians([-20, 0, 20, 45, 135, 160, 180, 200])
     ring = 0.33 * front.iris * np.stack([np.cos(turn), np.sin(turn)], axis=1)
     x, y = np.rint(front.irises[:, None] + ring).astype(int).reshape(-1, 2).T
-    return np.asarray(255.0 * srgb(linear(np.median(pixels[y, x], axis=0)) / SHOWN))
+    return np.asarray(255.0 * srgb(linear(np.median(pixels[y, x], axis=0)) / REFLECTED))
 
 
-def _nearest(colour: Float64, known: Mapping[str, Any]) -> str:
-    return min(known, key=lambda name: _apart(colour, np.array(known[name], float)))
+def _nearest(colour: Float64, colours: Mapping[str, Any]) -> str:
+    return min(colours, key=lambda name: _colour_difference(colour, np.array(colours[name], float)))
 
 
-def _apart(one: Float64, other: Float64) -> float:
+def _colour_difference(one: Float64, other: Float64) -> float:
     return float(np.linalg.norm(np.log(linear(one) + 0.02) - np.log(linear(other) + 0.02)))
 
 
 def _rim(pixels: Float64, points: Float64, skin: Float64) -> Float64 | None:
-    """Return the colour of hair beside the temples, on the side in the light, or None if skin is there."""
-    up, wide = points[TOP] - points[CHIN], points[ASIDE[1]] - points[ASIDE[0]]
+    """Return the colour of hair beside the temple on the brighter side, or None if there is no hair."""
+    up, wide = points[TOP] - points[CHIN], points[SIDES[1]] - points[SIDES[0]]
     sides = [points[k] + TEMPLE * up for k in TEMPLES]
-    side, way = max(zip(sides, (-1, 1), strict=True), key=lambda one: _colour(pixels, one[0]).sum())
-    seen, behind = _colour(pixels, side), _colour(pixels, side + way * BESIDE[0] * wide)
-    return seen if min(_apart(seen, skin), _apart(seen, behind)) >= ALIKE else None
+    side, sign = max(zip(sides, (-1, 1), strict=True), key=lambda one: _colour(pixels, one[0]).sum())
+    beside, behind = _colour(pixels, side), _colour(pixels, side + sign * BESIDE[0] * wide)
+    return (
+        beside if min(_colour_difference(beside, skin), _colour_difference(beside, behind)) >= ALIKE else None
+    )
 
 
 def _style(pixels: Float64, points: Float64, hair: Float64, skin: Float64, sex: float) -> str:
-    """Return a style: long hair hangs beside the jaw, and little hair has the colour of skin."""
-    if _apart(hair, skin) < ALIKE:
+    """Return a style: long if there is hair beside the jaw, "buzz" if the hair has the colour of skin."""
+    if _colour_difference(hair, skin) < ALIKE:
         return "buzz"
     behind = _colour(pixels, np.array([0.0, 0.0]))
-    wide = points[ASIDE[1]] - points[ASIDE[0]]
+    wide = points[SIDES[1]] - points[SIDES[0]]
     sides = [
-        _colour(pixels, points[k] + way * share * wide)
-        for k, way in zip(JAW, (-1, 1), strict=True)
+        _colour(pixels, points[k] + sign * share * wide)
+        for k, sign in zip(JAW, (-1, 1), strict=True)
         for share in BESIDE
     ]
-    hanging = sum(_apart(side, hair) < _apart(side, behind) for side in sides)
+    hanging = sum(_colour_difference(side, hair) < _colour_difference(side, behind) for side in sides)
     if hanging >= len(sides) / 2:
         return "bob"
     return "bun" if sex < 0.4 else "short"

@@ -1,4 +1,4 @@
-"""Places of landmarks on a person described by sliders, and how a camera sees them."""
+"""Landmarks on a person described by sliders, and their projection by a camera."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from realizer.tables import csv_rows, toml_table
 from realizer_studio.faces.person import makehuman
 from realizer_studio.faces.person.sliders import AGES, person_targets
 
-DISTANCE = 1.5  # m from the camera to the head, as people are photographed; pictures do not tell it
+DISTANCE = 1.5  # m from the camera to the head, assumed, because pictures do not show it
 SPREAD = 0.2  # standard deviation of a slider
-# Of a person of whom nothing is known: mean, standard deviation, bounds. Weight and muscle change no head.
+# Prior of an unknown person: mean, standard deviation, bounds. Weight and muscle hardly change a head.
 LIKELY = {"age": (42.0, 30.0, *AGES), "sex": (0.5, 1.5, 0.0, 1.0)}
 PEOPLES = {"african": (-0.5, 2.0, -5.0, 4.0), "asian": (-0.5, 2.0, -5.0, 4.0)}  # logarithms beside caucasian
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
+class _AnchorRow:
     view: str
     landmark: int
     a: int
@@ -34,17 +34,17 @@ class _Place:
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Where landmarks lie on the base mesh."""
+class LandmarkAnchors:
+    """The positions of landmarks on the base mesh, as barycentric coordinates."""
 
     numbers: Index  # (k,) of the landmarks
     corners: Index  # (k, 3) base vertices
-    shares: Float64  # (k, 3) of them
+    shares: Float64  # (k, 3) their weights
 
     @classmethod
-    def of(cls, view: str) -> Places:
-        """Return the places as they are seen in a view, front or side."""
-        rows = [row for row in csv_rows("landmark_places.csv", _Place, __package__) if row.view == view]
+    def of(cls, view: str) -> LandmarkAnchors:
+        """Return the anchors of the landmarks in a view, front or side."""
+        rows = [row for row in csv_rows("landmark_places.csv", _AnchorRow, __package__) if row.view == view]
         second, third = (np.array([getattr(row, f"share_{k}") for row in rows]) for k in "bc")
         return cls(
             np.array([row.landmark for row in rows]),
@@ -52,28 +52,28 @@ class Places:
             np.stack([1 - second - third, second, third], axis=1),
         )
 
-    def on(self, at: Float64) -> Float64:
-        """Return the places (k, 3) on a base mesh (n, 3)."""
+    def positions(self, at: Float64) -> Float64:
+        """Return the positions (k, 3) on a base mesh (n, 3)."""
         return np.asarray(np.einsum("nk,nki->ni", self.shares, at[self.corners]))
 
-    def some(self, chosen: Any) -> Places:
-        """Return some of the places."""
-        return Places(self.numbers[chosen], self.corners[chosen], self.shares[chosen])
+    def subset(self, chosen: Any) -> LandmarkAnchors:
+        """Return the chosen anchors."""
+        return LandmarkAnchors(self.numbers[chosen], self.corners[chosen], self.shares[chosen])
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How a camera sees a head."""
+    """The pose of a head in front of a camera."""
 
     turn: Float64  # (3,) rotation vector of the head, radians
-    size: float  # pixels a metre, at the distance of the eyes
+    size: float  # pixels per metre at the distance of the eyes
     middle: Float64  # (2,) pixels of the point between the eyes
 
     def __call__(self, at: Any) -> tuple[Float64, Float64]:
-        """Return the pixels (n, 2) of places (n, 3), and how near they are (n,), in metres."""
-        seen = np.asarray(at, np.float64) @ self.rotation.T
-        scale = self.size * DISTANCE / (DISTANCE - seen[:, 2:])
-        return self.middle + scale * seen[:, :2] * (1, -1), seen[:, 2]
+        """Return the pixels (n, 2) of points (n, 3), and their nearness (n,) to the camera in metres."""
+        rotated = np.asarray(at, np.float64) @ self.rotation.T
+        scale = self.size * DISTANCE / (DISTANCE - rotated[:, 2:])
+        return self.middle + scale * rotated[:, :2] * (1, -1), rotated[:, 2]
 
     @property
     def rotation(self) -> Float64:
@@ -82,27 +82,27 @@ class Pose:
 
 
 class Sliders:
-    """The base mesh by sliders, at some of its vertices.
+    """Some vertices of the base mesh as a function of sliders.
 
     Attributes:
-        names: of the sliders that are looked for; `low`, `high`: (k,) their bounds, in standard deviations.
+        names: of the free sliders; `low`, `high`: (k,) their bounds, in standard deviations.
     """
 
-    def __init__(self, data: Path, told: Mapping[str, Any], used: Index) -> None:
+    def __init__(self, data: Path, fixed: Mapping[str, Any], used: Index) -> None:
         """
         Args:
             data: the folder of shape targets.
-            told: sliders that are known.
-            used: the vertices that are asked for.
+            fixed: sliders with fixed values.
+            used: the vertices to compute.
         """
-        self._data, self._told = data, dict(told)
+        self._data, self._fixed = data, dict(fixed)
         self._mesh = makehuman.read_base(data)
         self._eyes = [np.unique(self._mesh.quads[f"helper-{side}-eye"]) for side in "lr"]
         self._used = np.unique(np.concatenate([used.ravel(), *self._eyes]))
         self._targets: dict[str, Float64] = {}
         sliders = dict.fromkeys(toml_table("person.toml")["sliders"], (0.0, SPREAD, -1.0, 1.0))
-        rows = {name: row for name, row in (LIKELY | sliders).items() if name not in told}
-        rows |= {} if "people" in told else PEOPLES
+        rows = {name: row for name, row in (LIKELY | sliders).items() if name not in fixed}
+        rows |= {} if "people" in fixed else PEOPLES
         self.names = tuple(rows)
         self._mean, self._spread, low, high = np.array(list(rows.values())).T
         self.low, self.high = (low - self._mean) / self._spread, (high - self._mean) / self._spread
@@ -111,14 +111,14 @@ class Sliders:
         """Return the table [person] of a recipe for values (k,), in standard deviations from the mean."""
         figures = self._mean + self._spread * np.clip(values, self.low, self.high)
         given = dict(zip(self.names, figures.tolist(), strict=True))
-        if "people" not in self._told:
+        if "people" not in self._fixed:
             shares = {name: float(np.exp(given.pop(name))) for name in PEOPLES} | {"caucasian": 1.0}
-            whole = sum(shares.values())
-            given["people"] = {name: round(share / whole, 4) for name, share in shares.items()}
-        return self._told | {k: v if k == "people" else round(v, 4) for k, v in given.items()}
+            total = sum(shares.values())
+            given["people"] = {name: round(share / total, 4) for name, share in shares.items()}
+        return self._fixed | {k: v if k == "people" else round(v, 4) for k, v in given.items()}
 
     def mesh(self, person: Mapping[str, Any]) -> Float64:
-        """Return the base mesh (n, 3) of a person, metres from between the eyes, before it is mended."""
+        """Return the base mesh (n, 3) of a person, metres from between the eyes, without corrections."""
         at = self._mesh.vertices.copy()
         for name, weight in person_targets(person).items():
             if name not in self._targets:

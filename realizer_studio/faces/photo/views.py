@@ -1,4 +1,4 @@
-"""The two photographs of a person, with what is seen in them."""
+"""The two photographs of a person, with landmarks and irises."""
 
 from __future__ import annotations
 
@@ -29,30 +29,30 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 FRONT, SIDE = "from the front", "from the side, turned by 30 to 60 degrees or by 90"
-SURE = 0.95  # presence of a face whose landmarks hold; from 70 degrees on it is less
-STRAIGHT, TURNED = 15.0, 25.0  # degrees: most from the front, least from the side
-SECOND = 0.5  # sides of two faces; a smaller one is in the background
+SURE = 0.95  # least presence of a face with reliable landmarks; it falls below at 70 degrees
+STRAIGHT, TURNED = 15.0, 25.0  # degrees: maximum from the front, minimum from the side
+SECOND = 0.5  # ratio of the sides of two faces, below which the smaller one is in the background
 SMALL = 120  # pixels from forehead to chin, at least
-GREY = 3  # steps of 255 by which the channels of a grey picture differ at most
+GREY = 3  # of 255; largest difference between the channels of a grey picture
 
 
 @dataclass(frozen=True, eq=False)
 class View:
     """A photograph of a face."""
 
-    image: Image  # RGB; that from the side is mirrored, if need be, so that the face looks to its right
-    points: Float64 | None  # (468, 2) pixels, or None: the face is in profile, where no landmark is found
-    region: Region  # where the face is
-    turn: float  # degrees to its left, roughly; 90 in profile
-    irises: Float64  # (2, 2) pixels of the middles of the irises
-    iris: float  # pixels of their mean diameter
+    image: Image  # RGB; a view from the side is mirrored if the face looks to the picture's left
+    points: Float64 | None  # (468, 2) pixels, or None in profile, where landmarks are unreliable
+    region: Region  # of the face
+    turn: float  # degrees to its left, approximate; 90 in profile
+    irises: Float64  # (2, 2) pixels, the centres of the irises
+    iris: float  # pixels, their mean diameter
 
 
 def read_views(front: Path, side: Path) -> tuple[View, View]:
     """Read the photographs of a person from the front and from the side.
 
     Raises:
-        FaceError: a file is no picture, grey, has no face, several, a small one, or one turned otherwise.
+        FaceError: a file is no picture, is grey, or has no face, several faces, or one of wrong size or turn.
     """
     one, other = _read(front, FRONT), _read(side, SIDE)
     if one.points is None or abs(one.turn) > STRAIGHT:
@@ -65,7 +65,7 @@ def read_views(front: Path, side: Path) -> tuple[View, View]:
     return one, other
 
 
-def _read(path: Path, wanted: str) -> View:
+def _read(path: Path, expected: str) -> View:
     try:
         image = read_picture(path)
     except TrackingError as error:
@@ -73,18 +73,18 @@ def _read(path: Path, wanted: str) -> View:
     small = np.asarray(image.resize((64, 64)), int)
     if np.ptp(small, axis=2).max() <= GREY:
         raise FaceError(f"{path}: wanted a picture in colour, got a grey one, which does not tell the skin's")
-    view = _seen(image, path, wanted)
+    view = _view(image, path, expected)
     if view.turn >= 0:
         return view
     from PIL import ImageOps
 
-    return _seen(ImageOps.mirror(image), path, wanted) if wanted == SIDE else view
+    return _view(ImageOps.mirror(image), path, expected) if expected == SIDE else view
 
 
-def _seen(image: Image, path: Path, wanted: str) -> View:
+def _view(image: Image, path: Path, expected: str) -> View:
     regions = sorted(detect(image, small=False), key=lambda region: -region.side)
     if not regions:
-        raise FaceError(f"{path}: wanted a face {wanted}, found none")
+        raise FaceError(f"{path}: wanted a face {expected}, found none")
     count = sum(region.side > SECOND * regions[0].side for region in regions)
     if count > 1:
         raise FaceError(f"{path}: wanted one face, found {count}; cut the picture around one of them")
@@ -100,7 +100,7 @@ def _seen(image: Image, path: Path, wanted: str) -> View:
 
 
 def _iris(face: Landmarks) -> float:
-    """Return the mean diameter of both irises in pixels: four points are on the rim of each."""
+    """Return the mean diameter of both irises in pixels, from four points on the rim of each."""
     both = zip((LEFT_EYE, RIGHT_EYE), face.eyes, strict=True)
-    rims = [eye_region(face.points, corners).place(eye[IRIS_MIDDLE:]) for corners, eye in both]
+    rims = [eye_region(face.points, corners).to_picture(eye[IRIS_MIDDLE:]) for corners, eye in both]
     return float(2 * np.mean([np.linalg.norm(rim[1:] - rim[0], axis=1) for rim in rims]))

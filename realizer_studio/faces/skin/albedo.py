@@ -1,4 +1,4 @@
-"""The albedo map of a skin: its colour, by layers."""
+"""The albedo map of a skin, painted in layers."""
 
 from functools import partial
 from typing import Any
@@ -17,15 +17,15 @@ from realizer_studio.faces.skin.skin import Skin
 
 EDGE = 0.0012  # m, of the noise in large spots
 NEAR = np.array([0.035, 0.018])  # m around the middle of a brow
-BROW = 0.8  # share of the colour of brows that is painted between their hairs
-LASHES = 0.75, 0.35  # that of lashes at their roots, of the upper and the lower lid
+BROW = 0.8  # opacity of the paint between the hairs of brows
+LASHES = 0.75, 0.35  # opacity of the paint at the roots of upper and lower lashes
 
 
 def paint_albedo(skin: Skin, pores: Float32, lines: Float32) -> Float32:
     """Return the colour of the skin (k, 3), sRGB 0..255.
 
     Args:
-        pores: (k,) 0..1, how dark pores are; lines: (k,) 0..1, how deep lines are.
+        pores: (k,) 0..1, darkness of pores; lines: (k,) 0..1, depth of lines.
     """
     out = skin.texels.spread(skin.part.colours)
     _mottle(skin, out)
@@ -57,8 +57,8 @@ def _mottle(skin: Skin, out: Float32) -> None:
 
 
 def _vessels(skin: Skin, out: Float32) -> None:
-    """Tint veins at temples and lids, and with age capillaries of cheeks and nose."""
-    temples = skin.around("3.7", "3.12", radii=(0.028, 0.034, 0.05), off=(0.018, 0.018, -0.02))
+    """Tint veins at temples and lids, and capillaries of cheeks and nose, which grow with age."""
+    temples = skin.around("3.7", "3.12", radii=(0.028, 0.034, 0.05), offset=(0.018, 0.018, -0.02))
     lids = skin.around("3.1", "3.2", "3.3", "3.4", radii=(0.020, 0.012, 0.02))
     flushed = skin.around("5.3", "5.4", "9.1", "9.2", radii=(0.026, 0.022, 0.03))
     for name, where in (
@@ -88,21 +88,21 @@ def _spots(skin: Skin, out: Float32) -> None:
         out *= 1 - share[:, None] * (1 - Skin.float(skin.table[name]["tint"]))
 
 
-def _disc(firm: float, away: Any) -> Any:
-    return smooth(away, 1.0, firm)
+def _disc(firm: float, distance: Any) -> Any:
+    return smooth(distance, 1.0, firm)
 
 
 def crease(skin: Skin) -> Float32:
-    """Return the creases across the lips, 0..1 (k,): they follow the lips' own coordinates."""
+    """Return the creases across the lips, 0..1 (k,), in the coordinates of the lips."""
     along = skin.field(skin.lips.u) * 0.025
-    place = np.stack([along, 0.0005 * skin.ring, np.zeros_like(along)], 1)
+    coordinates = np.stack([along, 0.0005 * skin.ring, np.zeros_like(along)], 1)
     length = skin.table["lips"]["crease"]
 
     def field(at: Any) -> Any:
         fine = ridges(at, (length, 0.004, 1.0), skin.seed + 40)
         return np.maximum(0.7 * fine, ridges(at, (length * 2.2, 0.006, 1.0), skin.seed + 41))
 
-    return skin.red * skin.within(skin.red, field, place)
+    return skin.red * skin.within(skin.red, field, coordinates)
 
 
 def _lips(skin: Skin, out: Float32) -> None:
@@ -111,7 +111,7 @@ def _lips(skin: Skin, out: Float32) -> None:
     strength = look.lips * (1 - 0.25 * look.age)
     full = strength + (1 - strength) * 0.75 * smooth(skin.ring, 4.0, 1.0)
     share = skin.red * skin.float(full * (1 - 0.55 * smooth(u, 0.85, 1.0)))
-    # The upper lip faces down and looks darker still; the red is fullest where the lips meet.
+    # The upper lip faces down and is darker; the red is strongest where the lips meet.
     tone = (1 - 0.06 * upper) * (1 - 0.05 * smooth(skin.ring, 5, 1)) * (1 - row["dark"] * crease(skin))
     tone = tone * (1 + 0.03 * skin.noise(0.0016, 42, skin.red))
     colour = Skin.float(skin.recipe.colours["lips"]) * skin.float(tone)[:, None]
@@ -124,10 +124,10 @@ def _lips(skin: Skin, out: Float32) -> None:
 
 def _margins(skin: Skin, out: Float32) -> None:
     edge, caruncle = skin.margins()
-    # Between the wet edge of a lid and its lashes the skin is as pale as before.
+    # The wet edge of a lid is pink; between it and the lashes the skin keeps its colour.
     share = np.maximum(0.45 * smooth(edge, 0.35, 0.9), 0.7 * caruncle)
     out += skin.float(share)[:, None] * (Skin.float(skin.recipe.colours["corner"]) * 0.92 - out)
-    rooted = np.zeros(len(skin.person.ground.at))
+    rooted = np.zeros(len(skin.person.figure.at))
     for lid in skin.lids:
         for row, share in zip((lid.lower, lid.upper), LASHES[::-1], strict=True):
             rooted[row[2:-1]] = share
@@ -138,8 +138,8 @@ def _margins(skin: Skin, out: Float32) -> None:
 
 
 def _brows(skin: Skin, out: Float32) -> None:
-    ground, look = skin.person.ground, skin.look
-    points = {name: ground.point(name) for name in ground.points}
+    figure, look = skin.person.figure, skin.look
+    points = {name: figure.point(name) for name in figure.points}
     colour = Skin.float(0.9 * tint_of(skin.recipe.colours["brows"], look))
     for side in (1, -1):
         line = Brow(points, side, look)
@@ -153,11 +153,11 @@ def _brows(skin: Skin, out: Float32) -> None:
 
 
 def _beard(skin: Skin, out: Float32) -> None:
-    grown = min(1.0, 2 * skin.look.beard)  # no skin is to shine through a beard
+    grown = min(1.0, 2 * skin.look.beard)  # skin does not show through a beard
     amount = max(skin.look.stubble, grown)
     if not amount:
         return
-    where = skin.field(skin_colours.beard(skin.person.ground, skin.lips)) * (1 - skin.red) * skin.dry
+    where = skin.field(skin_colours.beard(skin.person.figure, skin.lips)) * (1 - skin.red) * skin.dry
     where *= np.clip(1 + 0.25 * skin.noise(0.006, 43), 0.7 * grown, 1.2)
     hair = Skin.float(colour_of(style_of(skin.recipe.hair), skin.recipe.colours["hair"]))
     shade = (np.clip(where, 0, 1) * amount * 0.30 + smooth(where, 0.3, 0.8) * grown * 0.65)[:, None]
@@ -170,14 +170,14 @@ def _dots(skin: Skin, out: Float32, name: str, where: Any, colour: Float32) -> N
     row = skin.table[name]
     found, radius = skin.mark(name, where, 44)
     radius = np.maximum(radius, 0.8 * skin.texels.width[found])
-    share = skin.texels.stamp(found, radius, lambda away: smooth(away, 1.0, 0.1)) * row["share"]
+    share = skin.texels.stamp(found, radius, lambda distance: smooth(distance, 1.0, 0.1)) * row["share"]
     out += share[:, None] * (colour * 0.8 - out)
 
 
 def _scalp(skin: Skin, out: Float32) -> None:
-    patch, ground, style = skin.part.submesh, skin.person.ground, style_of(skin.recipe.hair)
-    points = {name: ground.point(name) for name in ground.points}
-    scalp = Scalp(patch.positions(ground.at), patch.triangles, points, style.line, style.rise)
+    patch, figure, style = skin.part.submesh, skin.person.figure, style_of(skin.recipe.hair)
+    points = {name: figure.point(name) for name in figure.points}
+    scalp = Scalp(patch.positions(figure.at), patch.triangles, points, style.line, style.rise)
     ragged = 0.004 * skin.noise(0.005, 45)
     where = np.clip(skin.texels.broad(partial(shadow, scalp, style)) * (1 + 40 * ragged), 0, 1)
     hair = Skin.float(colour_of(style, skin.recipe.colours["hair"]))
@@ -187,7 +187,7 @@ def _scalp(skin: Skin, out: Float32) -> None:
 
 def _mouth(skin: Skin, out: Float32) -> None:
     """Paint the lining of the mouth, which is red and darkens to the back."""
-    front = float(skin.person.ground.point("2.2")[2])
+    front = float(skin.person.figure.point("2.2")[2])
     lining = skin_colours.lining(skin.recipe.colours, front - skin.at[:, 2])
     share = skin.float(smooth(skin.ring, 1.0, 0.3) * ~skin.dry)[:, None]
     out += share * (skin.float(lining) - out)

@@ -1,4 +1,4 @@
-"""The picture of an eye for the maps: iris and white, on the square that `eyeball` describes."""
+"""The texture of an eye: iris and white, on the square that `eyeball` describes."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,9 +12,9 @@ from realizer_studio.faces.face_files import to_bytes
 from realizer_studio.faces.parts import smooth
 from realizer_studio.faces.skin.noise import noise, ridges
 
-FINER = 3  # times finer than the picture it is painted
-COLLARETTE = 0.56  # place of the ruff around the pupil, in radii of the limbus
-STEPS = 100  # of a vessel, at most; most have under 30
+FINER = 3  # supersampling
+COLLARETTE = 0.56  # radius of the ruff around the pupil, in radii of the limbus
+STEPS = 100  # of a vessel at most; most have under 30
 VESSELS = 64
 ROUGHNESS = 0.10, 0.34  # of cornea and white
 
@@ -50,7 +50,7 @@ def _smaller(picture: Any, size: int) -> UInt8:
 
 
 def _field(function: Any, x: Float64, y: Float64, out: Float64, lengths: Any, seed: int) -> Any:
-    """Return a random field around the pupil: (x, y) gives the angle, `out` the distance."""
+    """Return a random field around the pupil at the angle of (x, y) and the distance `out`."""
     around = np.stack([x, y], -1) / np.maximum(np.hypot(x, y), 1e-6)[..., None]
     at = np.concatenate([around, out[..., None]], -1).reshape(-1, 3)
     return function(at, (lengths[0], lengths[0], lengths[1]), seed).reshape(x.shape)
@@ -61,7 +61,7 @@ def _iris(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed: 
     inner, outer = smooth(out, edge + 0.05, edge - 0.07), smooth(out, 0.66, 0.98)
     base = tint["iris_middle"] + inner[..., None] * (tint["iris_inner"] - tint["iris_middle"])
     base = base + outer[..., None] * (tint["iris_outer"] - base)
-    # Fibres run from the ruff to the rim, in waves; between them the iris is dark.
+    # Wavy fibres run from the ruff to the rim; between them the iris is dark.
     bent = 0.05 * _field(noise, x, y, out, (0.5, 0.35), seed + 1)
     c, s = np.cos(bent), np.sin(bent)
     u, v = c * x - s * y, s * x + c * y
@@ -72,32 +72,32 @@ def _iris(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed: 
     crypts = smooth(_field(noise, x, y, out, (0.22, 0.16), seed + 5), 0.9, 1.6)
     light *= 1 - 0.35 * crypts * smooth(out, edge, edge + 0.06) * smooth(out, 0.92, 0.75)
     light *= 1 + 0.26 * np.exp(-(((out - edge) / 0.035) ** 2)) - 0.10 * smooth(out, edge - 0.02, 0.40)
-    # Furrows where the iris folds when the pupil widens.
+    # Furrows where the iris folds as the pupil widens.
     light *= 1 - 0.10 * np.exp(-(((out - 0.80 - 0.02 * bent) / 0.018) ** 2))
-    made = base * light[..., None]
+    colour = base * light[..., None]
     rim = (smooth(out, 0.80, 0.99) * 0.85)[..., None]
-    made = made + rim * (tint["ring"] - made)
+    colour = colour + rim * (tint["ring"] - colour)
     ruff = 0.006 * _field(noise, x, y, out * 0, (0.12, 1.0), seed + 6) + PUPIL / LIMBUS
     black = smooth(out, ruff + 0.035, ruff - 0.015)[..., None]
-    return np.clip(made + black * (tint["pupil"] - made), 0, 255)
+    return np.clip(colour + black * (tint["pupil"] - colour), 0, 255)
 
 
 def _white(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed: int) -> Any:
     far = smooth(out, 1.05, 1.7)
     cloud = _field(noise, x, y, out, (0.4, 0.3), seed + 10)
     # Grey at the limbus, ivory farther out, pink in the corners.
-    made = tint["white"] * (0.79 + 0.010 * cloud)[..., None]
-    made = made * (1 + (1 - far)[..., None] * np.array([-0.02, -0.012, -0.015]))
-    made = made * (1 + far[..., None] * np.array([0.02, -0.045, -0.12]))
+    colour = tint["white"] * (0.79 + 0.010 * cloud)[..., None]
+    colour = colour * (1 + (1 - far)[..., None] * np.array([-0.02, -0.012, -0.015]))
+    colour = colour * (1 + far[..., None] * np.array([0.02, -0.045, -0.12]))
     pink = smooth(-x, 0.50, 0.95) * 0.7 + smooth(x, 0.56, 0.95) * 0.55 + smooth(np.abs(y), 0.6, 0.95) * 0.4
     pink = np.clip(pink + 0.05 * cloud * far, 0, 0.8)[..., None]
-    made = made + pink * (tint["corner"] - made)
+    colour = colour + pink * (tint["corner"] - colour)
     red = _vessels(x.shape[0], seed)[..., None]
-    return np.clip(made * (1 - red * np.array([0.10, 0.5, 0.5])), 0, 255)
+    return np.clip(colour * (1 - red * np.array([0.10, 0.5, 0.5])), 0, 255)
 
 
 def _vessels(size: int, seed: int) -> Float32:
-    """Return how much of a vessel is at each texel, (size, size) 0..1: winding lines towards the limbus."""
+    """Return the coverage by vessels, (size, size) 0..1: winding lines towards the limbus."""
     from PIL import Image, ImageDraw
     from scipy.ndimage import gaussian_filter
 
@@ -105,17 +105,17 @@ def _vessels(size: int, seed: int) -> Float32:
     paper = Image.new("F", (size, size), 0)
     draw = ImageDraw.Draw(paper)
     for _ in range(VESSELS):
-        # Most come from the corners.
+        # Most vessels begin in the corners.
         angle = rng.choice([0, np.pi]) + rng.normal(0, 0.55)
-        place, way = np.array([np.cos(angle), np.sin(angle)]) * rng.uniform(0.8, 1.0), angle + np.pi
+        position, heading = np.array([np.cos(angle), np.sin(angle)]) * rng.uniform(0.8, 1.0), angle + np.pi
         end, dark, width = rng.uniform(0.54, 0.74), rng.uniform(0.4, 1.0), rng.uniform(1.8, 4.6)
         for _ in range(STEPS):  # a vessel may wind away
-            if np.hypot(*place) <= end:
+            if np.hypot(*position) <= end:
                 break
-            way += rng.normal(0, 0.22) + 0.15 * np.sin(angle + np.pi - way)
-            step = place + 0.02 * np.array([np.cos(way), np.sin(way)])
-            ends = [tuple((at + 1) / 2 * size) for at in (place, step)]
-            fade = float(np.clip((np.hypot(*place) - end) / 0.2, 0.1, 1))
+            heading += rng.normal(0, 0.22) + 0.15 * np.sin(angle + np.pi - heading)
+            step = position + 0.02 * np.array([np.cos(heading), np.sin(heading)])
+            ends = [tuple((point + 1) / 2 * size) for point in (position, step)]
+            fade = float(np.clip((np.hypot(*position) - end) / 0.2, 0.1, 1))
             draw.line([*ends[0], *ends[1]], fill=dark * fade, width=max(1, round(width * fade)))
-            place = step
+            position = step
     return np.asarray(gaussian_filter(np.array(paper), FINER * 0.35), np.float32)

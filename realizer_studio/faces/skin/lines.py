@@ -1,4 +1,4 @@
-"""Lines of the skin: what expressions fold, and what age leaves of it."""
+"""Lines of the skin: folds of expressions, and wrinkles that age leaves."""
 
 import math
 from dataclasses import dataclass
@@ -12,45 +12,45 @@ from realizer_studio.faces.parts import smooth
 from realizer_studio.faces.skin.skin import Skin
 
 SIDES = {1: "left", -1: "right"}
-STEP = 0.0003  # m between the points of a line that distances are measured to
-BEHIND = -0.3  # forward part of a normal below which there are no lines
-FACING = 0.15  # cosine at which a surface still counts as seen
-REACH = 4.0  # widths from its middle at which a line ends
+STEP = 0.0003  # m between the points of a line
+BEHIND = -0.3  # z of a normal below which there are no lines
+FACING = 0.15  # least cosine between a surface and the direction from which a line is seen
+REACH = 4.0  # widths from the middle of a line to its edge
 WANDER = 0.0007  # m, standard deviation of a person's points from those of the table
-BEND = 0.0006  # m that lines wander
+BEND = 0.0006  # m; amplitude of a line's bends
 TAPER = 0.25  # of a line's length, over which it begins and ends
-PLATEAU, FADE = 0.009, 0.020  # m from a line where its fold is shown in full, and where it is not
-NEAR = 0.0025  # m further away, at which a line has a third of the say
+PLATEAU, FADE = 0.009, 0.020  # m from a line up to which its fold shows fully, and from which it does not
+NEAR = 0.0025  # m over which the weight of a line falls to a third
 
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """A line as it is seen from a direction."""
+    """A line in the view from one direction."""
 
-    row: dict[str, Any]  # its figures in `realizer/tables/skin_lines.toml`
+    row: dict[str, Any]  # its row in `realizer/tables/skin_lines.toml`
     side: int  # 1 left, -1 right
     path: Float64  # (j, 2) metres to the right and up, as seen from `towards`
     right: Float64  # (3,) directions
     towards: Float64  # (3,) directions
-    share: Float64  # (j,) how deep it is along it
-    drives: dict[str, Float64]  # region -> (j,) 0..1, what folds the skin along it
+    share: Float64  # (j,) depth along the line
+    drives: dict[str, Float64]  # region -> (j,) 0..1, its weight along the line
 
-    def near(self, at: Any, ups: Any, reach: float) -> tuple[Any, Float64, Any]:
-        """Return which places (j,) are within reach of the line, their distance and their nearest point."""
+    def near(self, at: Any, normals: Any, reach: float) -> tuple[Any, Float64, Any]:
+        """Return the points (j,) within reach of the line, with distance and nearest point of the line."""
         from scipy.spatial import cKDTree
 
         flat = np.stack([at @ self.right, at[:, 1]], 1)
         low, high = self.path.min(axis=0) - reach, self.path.max(axis=0) + reach
         inside = ((flat > low) & (flat < high)).all(axis=1)
-        found = np.flatnonzero(inside & (ups @ self.towards > FACING))
+        found = np.flatnonzero(inside & (normals @ self.towards > FACING))
         hits: Any = cKDTree(self.path).query(flat[found], distance_upper_bound=reach)
-        away, point = hits
-        kept = np.isfinite(away)
-        return found[kept], away[kept], point[kept]
+        distances, point = hits
+        within = np.isfinite(distances)
+        return found[within], distances[within], point[within]
 
 
 def lines_of(skin: Skin) -> list[Line]:
-    """Return the lines of a person, with their own irregularities."""
+    """Return the lines of a person, with individual irregularities."""
     return [
         _line(skin, row, side, copy, 1000 + 10 * number)
         for number, row in enumerate(toml_table("skin_lines.toml")["lines"])
@@ -60,18 +60,18 @@ def lines_of(skin: Skin) -> list[Line]:
 
 
 def _line(skin: Skin, row: dict[str, Any], side: int, copy: int, number: int) -> Line:
-    """Return a copy of a line; `number` is that of its random numbers."""
+    """Return a copy of a line; `number` seeds its random numbers."""
     rng = skin.rng(number + side + 1 + 3 * copy)
     yaw = math.radians(row["yaw"]) * side
     right = np.array([math.cos(yaw), 0, -math.sin(yaw)])
     knots = _knots(skin, row, side, right) + rng.normal(0, WANDER, (len(row["through"]), 2))
     copies, apart = row["copies"]
-    off = (copy - (copies - 1) / 2) * apart * skin.person.ground.fapu().es0
-    # Copies are not parallel, and each begins and ends somewhere else.
-    curve, share = _course(knots, off * rng.uniform(0.8, 1.2), off * rng.normal(0, 0.3))
+    offset = (copy - (copies - 1) / 2) * apart * skin.person.figure.fapu().es0
+    # Copies are not parallel, and differ in beginning and end.
+    curve, share = _course(knots, offset * rng.uniform(0.8, 1.2), offset * rng.normal(0, 0.3))
     t = np.linspace(0, 1, len(curve))
     meets = bool(row.get("meets"))
-    if meets:  # its mirror image, at a height that both know
+    if meets:  # it meets its mirror image: a common random height
         level = skin.rng(number).normal(0, WANDER) + curve[-1, 1] - knots[-1, 1]
         curve += smooth(t, 0.2, 1.0)[:, None] * (
             [0, _knots(skin, row, side, right)[-1, 1] + level] - curve[-1]
@@ -79,28 +79,28 @@ def _line(skin: Skin, row: dict[str, Any], side: int, copy: int, number: int) ->
     begin, end = rng.uniform(-0.05, 0.18), rng.uniform(0.85, 1.05)
     deep = smooth(t, begin, begin + TAPER) * (1 if meets else smooth(t, end, end - TAPER))
     drives: dict[str, Float64] = {}
-    for drive, own in zip(row["drives"], share.T, strict=True):
+    for drive, amount in zip(row["drives"], share.T, strict=True):
         name = f"{drive}_{SIDES[side]}"
-        drives[name] = drives.get(name, np.zeros(len(t))) + own
+        drives[name] = drives.get(name, np.zeros(len(t))) + amount
     towards = np.array([math.sin(yaw), 0, math.cos(yaw)])
-    return Line(row, side, curve, right, towards, deep * rng.uniform(0.7 if off else 0.9, 1.0), drives)
+    return Line(row, side, curve, right, towards, deep * rng.uniform(0.7 if offset else 0.9, 1.0), drives)
 
 
 def _knots(skin: Skin, row: dict[str, Any], side: int, right: Float64) -> Float64:
-    """Return the points that a line goes through, (j, 2) metres to the right and up."""
-    ground = skin.person.ground
-    size, knots = ground.fapu().es0, []
+    """Return the points of a line in the table, (j, 2) metres to the right and up."""
+    figure = skin.person.figure
+    size, knots = figure.fapu().es0, []
     for name, out, up in row["through"]:
-        place = ground.point(name) * [side, 1, 1]
-        knots.append([place @ right + side * out * size, place[1] + up * size])
+        position = figure.point(name) * [side, 1, 1]
+        knots.append([position @ right + side * out * size, position[1] + up * size])
     return np.array(knots)
 
 
-def _course(knots: Float64, off: float, slant: float) -> tuple[Float64, Float64]:
-    """Return the curve (j, 2) beside knots (i, 2), and the share of each knot in its points (j, i).
+def _course(knots: Float64, offset: float, slant: float) -> tuple[Float64, Float64]:
+    """Return the curve (j, 2) parallel to knots (i, 2), and the weight of each knot at its points (j, i).
 
     Args:
-        off: metres that it lies beside them; slant: metres that this grows by from end to end.
+        off: metres between knots and curve; slant: metres by which this grows from end to end.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -109,41 +109,41 @@ def _course(knots: Float64, off: float, slant: float) -> tuple[Float64, Float64]
     curve = np.asarray(PchipInterpolator(along, knots)(where))
     across = np.gradient(curve, axis=0)[:, ::-1] * [-1, 1]
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-    curve = curve + across * (off + slant * (where / along[-1] - 0.5))[:, None]
-    return curve, np.stack([np.interp(where, along, own) for own in np.eye(len(along))], 1)
+    curve = curve + across * (offset + slant * (where / along[-1] - 0.5))[:, None]
+    return curve, np.stack([np.interp(where, along, weight) for weight in np.eye(len(along))], 1)
 
 
-def groove(away: Any, width: float) -> Any:
-    """Return the depth of a line, 1 in its middle; skin is pushed up beside it."""
-    x = np.asarray(away) / width
+def groove(distance: Any, width: float) -> Any:
+    """Return the profile of a line: depth 1 in its middle, and ridges of skin beside it."""
+    x = np.asarray(distance) / width
     return np.exp(-(x**2)) - 0.30 * np.exp(-(((x - 2.2) / 0.9) ** 2))
 
 
 def engrave(skin: Skin, lines: list[Line]) -> tuple[Float32, Float32]:
-    """Return heights (k,) in metres: of the face at rest, and of its folds at full."""
-    ups = skin.normals()
+    """Return heights (k,) in metres of the face at rest, and of its complete folds."""
+    normals = skin.normals()
     heights = np.concatenate([line.path[:, 1] for line in lines])
-    there = (skin.at[:, 1] > heights.min() - FADE) & (skin.at[:, 1] < heights.max() + FADE)
-    some = np.flatnonzero(there & (ups[:, 2] > BEHIND) & skin.dry)
+    in_reach = (skin.at[:, 1] > heights.min() - FADE) & (skin.at[:, 1] < heights.max() + FADE)
+    some = np.flatnonzero(in_reach & (normals[:, 2] > BEHIND) & skin.dry)
     bend = BEND * np.stack([skin.noise(0.007, 50), skin.noise(0.007, 51)], 1)[some]
-    at, ups = skin.at[some], ups[some]
+    at, normals = skin.at[some], normals[some]
     at[:, :2] += bend
     varied = np.clip(0.85 + 0.25 * skin.noise(0.005, 52)[some], 0.3, 1.2)
     rest, folds = np.zeros((2, len(some)), np.float32)
     for line in lines:
         row = line.row
-        found, away, point = line.near(at, ups, REACH * row["width"])
-        deep = groove(away, row["width"]) * line.share[point] * row["depth"] * varied[found]
+        found, distance, point = line.near(at, normals, REACH * row["width"])
+        deep = groove(distance, row["width"]) * line.share[point] * row["depth"] * varied[found]
         young = row.get("young", 1.0)
         folds[found] = _deepest(folds[found], -deep * (young + (1 - young) * skin.look.age))
         rest[found] = _deepest(rest[found], -deep * row["age"] * _aged(skin, line))
-    whole = np.zeros((2, len(skin.at)), np.float32)
-    whole[:, some] = rest, folds
-    return whole[0], whole[1]
+    heights_map = np.zeros((2, len(skin.at)), np.float32)
+    heights_map[:, some] = rest, folds
+    return heights_map[0], heights_map[1]
 
 
 def _aged(skin: Skin, line: Line) -> float:
-    """Return how deep age has made a line, 0..1: every person's lines age in their own order."""
+    """Return the share of a line's depth at the person's age, which varies from line to line."""
     early = skin.rng(2000 + sum(map(ord, line.row["name"]))).uniform(0.75, 1.25)
     return float(np.clip(skin.look.age * early, 0, 1.3))
 
@@ -154,7 +154,7 @@ def _deepest(one: Any, other: Any) -> Any:
 
 
 def regions(lines: list[Line]) -> tuple[str, ...]:
-    """Return the names of the regions whose folds have an amount of their own: a drive and a side."""
+    """Return the names of the regions whose folds have separate amounts: a drive and a side."""
     return tuple(sorted({name for line in lines for name in line.drives} | set(_fields_drives())))
 
 
@@ -164,20 +164,20 @@ def _fields_drives() -> list[str]:
     return [f"{drive}_{side}" for drive in drives for side in SIDES.values()]
 
 
-def weights(skin: Skin, lines: list[Line], ups: Float64) -> Float32:
-    """Return how much each region's folds show at the vertices of the skin, (n, regions) 0..1.
+def weights(skin: Skin, lines: list[Line], normals: Float64) -> Float32:
+    """Return the weights of the regions' folds at the vertices of the skin, (n, regions) 0..1.
 
-    A vertex shows most of the region whose line is nearest.
+    The region with the nearest line has the largest weight.
     """
     at = skin.part.vertices
     names = regions(lines)
     score, cover = np.zeros((len(at), len(names))), np.zeros(len(at))
     for line in lines:
-        found, away, point = line.near(at, ups, FADE)
-        cover[found] = np.maximum(cover[found], smooth(away, FADE, PLATEAU))
-        for name, own in line.drives.items():
+        found, distance, point = line.near(at, normals, FADE)
+        cover[found] = np.maximum(cover[found], smooth(distance, FADE, PLATEAU))
+        for name, amount in line.drives.items():
             column = names.index(name)
-            score[found, column] = np.maximum(score[found, column], own[point] * np.exp(-away / NEAR))
+            score[found, column] = np.maximum(score[found, column], amount[point] * np.exp(-distance / NEAR))
     table = toml_table("skin_lines.toml")
     for name in ("around_mouth", "dimples"):
         mask = vertex_mask(skin, name)
@@ -191,8 +191,8 @@ def weights(skin: Skin, lines: list[Line], ups: Float64) -> Float32:
 
 
 def vertex_mask(skin: Skin, name: str) -> Float64:
-    """Return where the lines around the mouth and the dimples of the chin are, 0..1 (n,) at vertices."""
-    patch, ground = skin.part.submesh, skin.person.ground
+    """Return the weight (n,) 0..1 at vertices of the lines around the mouth, or of the chin's dimples."""
+    patch, figure = skin.part.submesh, skin.person.figure
     if name == "dimples":
-        return np.asarray(patch.mix @ ground.ellipsoid(ground.point("2.10"), (0.026, 0.020, 0.03)))
+        return np.asarray(patch.mix @ figure.ellipsoid(figure.point("2.10"), (0.026, 0.020, 0.03)))
     return np.asarray(patch.mix @ (np.asarray(skin.lips.lips) > 0.02).astype(float))

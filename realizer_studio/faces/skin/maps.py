@@ -1,4 +1,4 @@
-"""The maps of a face: baked, and written as pictures."""
+"""The baking of a face's maps, and their writer."""
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -25,18 +25,18 @@ from realizer_studio.faces.skin.relief import relief_of, surface_of
 from realizer_studio.faces.skin.skin import Skin
 from realizer_studio.faces.skin.texels import Texels
 
-RELIEF = 0.0012  # m that 255 steps of the relief are high
+RELIEF = 0.0012  # m; height of 255 steps of the relief
 TEXEL = 0.0002  # m, of a texel in the face
 QUALITY = {"albedo": 84, "relief": 90, "surface": 78, "folds": 84}  # of WebP, 0..100
 
 
 @dataclass(frozen=True, eq=False)
 class SkinMaps:
-    """The maps of a face, and where its skin is in them."""
+    """The maps of a face, and the texture coordinates of its skin."""
 
     # Albedo (s, s, 4), relief (s, s), surface (s, s, 3) and folds (s, s), as in a face folder.
     pictures: Mapping[str, UInt8]
-    corners: Float64  # (m, 3, 2) places in the maps, 0..1, of the corners of the skin's triangles
+    corners: Float64  # (m, 3, 2) texture coordinates, 0..1, of the corners of the skin's triangles
     regions: tuple[str, ...]  # names of the regions of folds
     weights: Float32  # (n, regions) 0..1 of the skin's vertices
 
@@ -53,8 +53,8 @@ class SkinMaps:
             (atlas.NEUTRAL.left + atlas.NEUTRAL.right) / 2,
             (atlas.NEUTRAL.top + atlas.NEUTRAL.bottom) / 2,
         ]
-        places = [np.tile(middle, (len(part.vertices), 1)) if part.uv is None else part.uv for part in parts]
-        corners = [uv[part.triangles] for uv, part in zip(places[1:], parts[1:], strict=True)]
+        part_uv = [np.tile(middle, (len(part.vertices), 1)) if part.uv is None else part.uv for part in parts]
+        corners = [uv[part.triangles] for uv, part in zip(part_uv[1:], parts[1:], strict=True)]
         uv = np.concatenate([self.corners, *corners])
         folds = np.zeros((sum(len(part.vertices) for part in parts), len(self.regions)))
         folds[: len(self.weights)] = self.weights
@@ -78,12 +78,12 @@ def bake(
     """Bake the maps of a person's skin.
 
     Args:
-        name: the face's, from which its spots, pores and lines are drawn.
+        name: the face's name, which seeds its spots, pores and lines.
         part: the skin, with its broad colours.
         size: texels of a side.
-        paint: takes the skin and its colours (k, 3), sRGB 0..255, to other colours.
+        paint: maps the skin and its colours (k, 3), sRGB 0..255, to other colours.
     """
-    corners = atlas.corners(person.ground.mesh, part.submesh)
+    corners = atlas.corners(person.figure.mesh, part.submesh)
     texels = Texels(part.vertices, part.triangles, corners, size)
     skin = Skin(texels, part, person, lips, lids, recipe, zlib.crc32(name.encode()) % 2**20)
     lines = lines_of(skin)
@@ -91,19 +91,19 @@ def bake(
     albedo = paint_albedo(skin, relief.pores, relief.lines)
     albedo = albedo if paint is None else paint(skin, albedo)
     surface = surface_of(skin, relief)
-    # Slopes are drawn as if all texels were of one width.
+    # The renderer computes slopes with one width for all texels.
     step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)
-    whole = np.dstack([texels.picture(to_bytes(albedo), 255), np.full((size, size), 255, np.uint8)])
+    albedo_map = np.dstack([texels.picture(to_bytes(albedo), 255), np.full((size, size), 255, np.uint8)])
     strands = atlas.HAIR.texels(size)
-    whole[strands] = hair_texture(strands[0].stop - strands[0].start)
+    albedo_map[strands] = hair_texture(strands[0].stop - strands[0].start)
     pictures = {
-        "albedo": whole,
+        "albedo": albedo_map,
         "relief": texels.picture(to_bytes(128 + relief.rest * step), 128),
         "surface": texels.picture(to_bytes(255 * surface), 255),
         "folds": texels.picture(to_bytes(128 + relief.folds * step), 128),
     }
     eye = atlas.EYES.texels(size)
-    looks = eye_picture(eye[0].stop - eye[0].start, recipe.colours, skin.seed)
-    pictures["albedo"][(*eye, slice(3))], pictures["surface"][eye] = looks
-    ups = vertex_normals(part.vertices, part.triangles)
-    return SkinMaps(pictures, corners, regions(lines), weights(skin, lines, ups))
+    eye_maps = eye_picture(eye[0].stop - eye[0].start, recipe.colours, skin.seed)
+    pictures["albedo"][(*eye, slice(3))], pictures["surface"][eye] = eye_maps
+    normals = vertex_normals(part.vertices, part.triangles)
+    return SkinMaps(pictures, corners, regions(lines), weights(skin, lines, normals))

@@ -1,4 +1,4 @@
-"""Random fields in space: smooth noise that needs no texture coordinates."""
+"""Smooth random fields in space."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ SPREAD = (151 / 315) ** 1.5  # standard deviation of a cubic B-spline over indep
 
 
 def noise(at: Any, length: Any, seed: int) -> Float32:
-    """Return smooth noise (k,) with mean 0 and standard deviation 1 at places (k, 3).
+    """Return smooth noise (k,) with mean 0 and standard deviation 1 at points (k, 3).
 
     Args:
         length: metres between independent values, one number or one for each axis.
-        seed: of the values.
+        seed: the seed of the values.
     """
     from scipy.ndimage import map_coordinates
 
@@ -28,5 +28,5 @@ def noise(at: Any, length: Any, seed: int) -> Float32:
 
 
 def ridges(at: Any, length: Any, seed: int) -> Float32:
-    """Return 0..1 (k,): thin lines of 1 where smooth noise changes its sign."""
+    """Return ridged noise (k,), 0..1, which is 1 along thin lines where smooth noise changes its sign."""
     return np.asarray(np.exp(-((noise(at, length, seed) / np.float32(0.3)) ** 2)))

@@ -1,4 +1,4 @@
-"""The relief of a skin (pores, fine lines, lines of age, folds of expressions) and its surface map."""
+"""The relief map of a skin (pores, fine lines, wrinkles, folds of expressions) and its surface map."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -15,7 +15,7 @@ from realizer_studio.faces.skin.lines import Line, engrave
 from realizer_studio.faces.skin.noise import ridges
 from realizer_studio.faces.skin.skin import Skin, distance_through
 
-# Metres that the darkest lines lie below what is so many texels around them.
+# Depth in metres of the darkest lines below their surroundings; radius of these surroundings in texels.
 DEEP, AROUND = 0.00018, 6.0
 
 
@@ -24,9 +24,9 @@ class Relief:
     """Heights of a skin at its texels."""
 
     rest: Float32  # (k,) metres at rest
-    folds: Float32  # (k,) metres, of all expressions' folds at full
-    pores: Float32  # (k,) 0..1, how deep in a pore
-    lines: Float32  # (k,) 0..1, how deep in a line at rest
+    folds: Float32  # (k,) metres, of the complete folds of all expressions
+    pores: Float32  # (k,) 0..1, depth of pores
+    lines: Float32  # (k,) 0..1, depth of lines at rest
 
 
 def relief_of(skin: Skin, lines: list[Line]) -> Relief:
@@ -51,9 +51,9 @@ def relief_of(skin: Skin, lines: list[Line]) -> Relief:
 
 
 def _loose(skin: Skin) -> Float32:
-    """Return where age loosens the skin, 0..1 (k,): below the eyes, beside the mouth, on the neck."""
-    eyes = skin.around("3.3", "3.4", "3.7", "3.12", radii=(0.032, 0.024, 0.04), off=(0, -0.008, 0))
-    mouth = skin.around("8.3", "8.4", radii=(0.035, 0.040, 0.05), off=(0.01, -0.01, 0))
+    """Return the weight (k,) 0..1 of skin that age loosens: below the eyes, beside the mouth, on the neck."""
+    eyes = skin.around("3.3", "3.4", "3.7", "3.12", radii=(0.032, 0.024, 0.04), offset=(0, -0.008, 0))
+    mouth = skin.around("8.3", "8.4", radii=(0.035, 0.040, 0.05), offset=(0.01, -0.01, 0))
     neck = skin.float(smooth(skin.at[:, 1], -0.10, -0.13))
     return skin.float(np.clip(0.25 + eyes + 0.7 * mouth + neck, 0, 1)) * skin.dry * (1 - skin.red)
 
@@ -65,18 +65,18 @@ def _network(skin: Skin) -> Any:
 
 
 def _pores(skin: Skin) -> tuple[Any, Any]:
-    """Return how dark pores are (k,) 0..1, and how deep, metres."""
+    """Return the darkness of pores, (k,) 0..1, and their depth, (k,) metres."""
     row, where = skin.table["pores"], skin.pored()
     dark, deep = np.zeros((2, len(where)), np.float32)
     open_skin = skin.dry * (1 - skin.red)
     for k, mask in enumerate((where, 1 - where)):
         apart = row["apart"][k]
         rng = skin.rng(66 + k)
-        # About as many as there is room for.
+        # About as many pores as fit.
         found = skin.texels.scatter(skin.float(mask * open_skin / apart**2), apart * 0.7, rng)
         radius = row["radius"][k] * rng.uniform(0.75, 1.25, len(found))
         radius = np.maximum(radius, 1.1 * skin.texels.width[found])
-        hole = skin.texels.stamp(found, skin.float(radius), lambda away: (1 - away**2) ** 2)
+        hole = skin.texels.stamp(found, skin.float(radius), lambda distance: (1 - distance**2) ** 2)
         hole *= np.clip(0.8 + 0.15 * skin.noise(0.004, 68 + k), 0.3, 1.2)
         dark, deep = np.maximum(dark, row["dark"][k] * hole), np.maximum(deep, row["depth"][k] * hole)
     return dark, deep
@@ -84,43 +84,43 @@ def _pores(skin: Skin) -> tuple[Any, Any]:
 
 def _bumps(skin: Skin) -> Any:
     found, radius = skin.mark("moles", skin.dry * skin.look.moles, 32)
-    bump = skin.texels.stamp(found, radius, lambda away: smooth(away, 1.0, 0.2))
+    bump = skin.texels.stamp(found, radius, lambda distance: smooth(distance, 1.0, 0.2))
     return bump * skin.table["moles"]["height"]
 
 
 def _neck(skin: Skin, row: dict[str, Any]) -> Any:
     """Return the lines around the neck."""
-    chin = skin.person.ground.point("2.1")
+    chin = skin.person.figure.point("2.1")
     below = chin[1] - 0.015 - (skin.at[:, 1] + 0.35 * (skin.at[:, 2] - chin[2] + 0.05))
     below = below + 0.0025 * skin.noise(0.030, 70) + 0.0006 * skin.noise(0.006, 71)
     number = np.round(below / row["apart"])
-    away = np.abs(below - number * row["apart"])
-    there = smooth(below, 0.4 * row["apart"], row["apart"]) * smooth(below, 0.13, 0.08)
+    distance = np.abs(below - number * row["apart"])
+    extent = smooth(below, 0.4 * row["apart"], row["apart"]) * smooth(below, 0.13, 0.08)
     front = smooth(skin.at[:, 2] - chin[2], -0.16, -0.10)
     uneven = np.clip(0.5 + 0.5 * skin.noise(0.022, 72), 0, 1)
     depth = row["depth"] * (row["young"] + (1 - row["young"]) * skin.look.age)
-    groove = np.exp(-((away / row["width"]) ** 2))
-    return skin.float(-depth * groove * there * front * uneven) * skin.dry
+    groove = np.exp(-((distance / row["width"]) ** 2))
+    return skin.float(-depth * groove * extent * front * uneven) * skin.dry
 
 
 def _around_mouth(skin: Skin, row: dict[str, Any]) -> tuple[Float32, Float32]:
-    """Return the lines that fan out from the lips: of the face at rest, and of pursed lips, metres."""
+    """Return the heights of the lines around the lips in metres, of the face at rest and of pursed lips."""
     lips = skin.lips
-    along, away = skin.field(lips.u) * 0.030, skin.field(lips.away)
-    place = np.stack([along, away / 3, skin.field(lips.is_upper * 0.05)], 1)
+    along, distance = skin.field(lips.u) * 0.030, skin.field(lips.distance)
+    coordinates = np.stack([along, distance / 3, skin.field(lips.is_upper * 0.05)], 1)
     reach = row["long"] * np.clip(0.8 + 0.3 * skin.noise(0.006, 74), 0.3, 1.3)
     reach = reach * (0.6 + 0.4 * skin.field(lips.is_upper * 1.0))
-    cover = smooth(skin.ring, 6.5, 8.5) * np.clip(1 - away / reach, 0, 1) * skin.dry
+    cover = smooth(skin.ring, 6.5, 8.5) * np.clip(1 - distance / reach, 0, 1) * skin.dry
     cover = cover * smooth(np.abs(skin.field(lips.u)), 1.0, 0.85)
     fan = partial(ridges, length=(row["apart"] * 0.7, 0.006, 0.02), seed=skin.seed + 73)
-    line = skin.within(cover, fan, place)
+    line = skin.within(cover, fan, coordinates)
     fold = skin.float(-row["depth"] * line * cover)
     return fold * row["age"] * np.float32(skin.look.age), fold
 
 
-CAVITY = 1500.0  # part of the light that a metre of depth below the surroundings takes away
-CAVITY_AROUND = 6.0  # texels of these surroundings
-EVEN, MATT = 0.6, 0.35  # brightness of skin, 0..1, below which it gets rougher, and by how much
+CAVITY = 1500.0  # share of the light that is lost per metre of depth below the surroundings
+CAVITY_AROUND = 6.0  # radius of these surroundings in texels
+EVEN, MATT = 0.6, 0.35  # brightness of skin, 0..1, below which it is rougher; roughness per brightness
 WET, TEARS = 0.35, 0.14  # roughness of the lining of the mouth, and of the lids' edges
 
 
@@ -139,7 +139,7 @@ def _roughness(skin: Skin) -> Float32:
     lids = skin.around("3.1", "3.2", "3.3", "3.4", radii=(0.020, 0.010, 0.02))
     out = row["cheek"] + (row["oily"] - row["cheek"]) * skin.oily()
     out = out + (row["lids"] - out) * np.clip(lids, 0, 1) * 0.6
-    # On dark skin the same highlight would look wet.
+    # Dark skin gets weaker highlights, because strong ones would look wet.
     dark = EVEN - float(np.mean(skin.recipe.colours["skin"])) / 255
     out = out + 0.06 * skin.look.age + MATT * max(0.0, dark)
     out = out + row["fine"] * (skin.noise(0.0012, 80) + 0.5 * skin.noise(0.005, 81))
@@ -153,11 +153,11 @@ def _roughness(skin: Skin) -> Float32:
 def _thickness(skin: Skin) -> Float32:
     full = skin.table["thickness"]["full"]
     part = skin.part
-    ups = vertex_normals(part.vertices, part.triangles)
-    # No light comes from inside the mouth.
+    normals = vertex_normals(part.vertices, part.triangles)
+    # No light passes from inside the mouth.
     outside = np.flatnonzero(part.submesh.mix @ (~skin.lips.inside * 1.0) > 0.5)
-    through = distance_through(part.vertices, ups, outside, full) / full
-    # Behind lids and lips is no air but an eye or teeth.
+    through = distance_through(part.vertices, normals, outside, full) / full
+    # Light passes through ears and nose only: behind lids and lips are eyes and teeth.
     ears = skin.around("10.1", "10.2", "10.3", "10.4", "10.7", "10.8", radii=(0.04, 0.04, 0.04))
     wings = skin.around("9.1", "9.2", radii=(0.016, 0.014, 0.016))
     airy = np.clip(2 * np.maximum(ears, wings), 0, 1)

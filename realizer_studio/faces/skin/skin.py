@@ -1,4 +1,4 @@
-"""The skin of a person at the texels of its maps: places, regions and figures that all maps are made of."""
+"""The skin of a person at the texels of its maps, with the fields that all maps use."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,9 +17,9 @@ from realizer_studio.faces.person.recipe import Recipe, appearance_of
 from realizer_studio.faces.skin.noise import noise
 from realizer_studio.faces.skin.texels import Texels
 
-ROUNDED = 3.0  # texels that rings are softened by, which have corners at vertices
-FINE = 0.0025  # m; longer noise is computed at few places
-EVEN = 1.6  # vertices along the border of the red over which it is evened
+ROUNDED = 3.0  # texels; radius by which rings are smoothed, which have corners at vertices
+FINE = 0.0025  # m; noise of greater length is interpolated from few points
+EVEN = 1.6  # vertices; radius by which the border of the red is smoothed
 
 
 class Skin:
@@ -27,11 +27,11 @@ class Skin:
 
     Attributes:
         texels: of the maps; part: the skin of the mesh.
-        person, lips, lids, recipe: as they are made of it; look: figures of the recipe.
+        person, lips, lids, recipe: of the person; look: numbers of the recipe.
         table: `realizer/tables/skin.toml`.
-        seed: of this person's own spots and lines.
-        ring: (k,) place across the lips: 0 inside, 1 where they meet, 7 the border of the red, 11 beyond.
-        red: (k,) 0..1, the red of the lips.
+        seed: of the person's spots and lines.
+        ring: (k,) position across the lips: 0 inside, 1 where they meet, 7 the border of the red, 11 beyond.
+        red: (k,) 0..1, weight of the red of the lips.
         dry: (k,) bool, texels that are not in the mouth.
     """
 
@@ -58,12 +58,12 @@ class Skin:
         self.red: Float32 = self.float(smooth(self.ring + shift, *self.table["lips"]["border"])) * self.dry
 
     def _bordered(self, ring: Float32) -> Float32:
-        """Return places across the lips, with an even border of the red instead of the mesh's."""
+        """Return positions across the lips with a smooth border of the red instead of the mesh's."""
         from scipy.interpolate import CubicSpline
         from scipy.ndimage import gaussian_filter1d
         from scipy.spatial import cKDTree
 
-        at, t = self.person.ground.at, np.arange(RING_SIZE + 1)
+        at, t = self.person.figure.at, np.arange(RING_SIZE + 1)
         inner, line, outer = (at[self.lips.rings[k]] for k in (BORDER - 1, BORDER, BORDER + 1))
         gap = np.linalg.norm(outer - inner, axis=1, keepdims=True) / 2
         across = gaussian_filter1d((outer - inner) / gap**2 / 2, 3 * EVEN, axis=0, mode="wrap")
@@ -85,25 +85,25 @@ class Skin:
 
     @property
     def at(self) -> Float32:
-        """Places of the texels, (k, 3) metres."""
+        """Positions of the texels, (k, 3) metres."""
         return self.texels.at
 
     def rng(self, number: int) -> np.random.Generator:
-        """Return this person's own random numbers for one purpose."""
+        """Return the person's random generator for one purpose."""
         return np.random.default_rng([self.seed, number])
 
     def noise(self, length: float, number: int, mask: Any = None) -> Float32:
-        """Return this person's own smooth noise (k,).
+        """Return the person's smooth noise (k,) for one purpose.
 
         Args:
-            length: metres between independent values; number: what the noise is for.
-            mask: (k,) where it is wanted, if not everywhere; it is 0 elsewhere.
+            length: metres between independent values; number: of the purpose.
+            mask: (k,) if given, noise is 0 where it is 0.
         """
         field = partial(noise, length=length, seed=self.seed + number)
         return self.texels.broad(field) if length > FINE else self.within(mask, field)
 
     def within(self, mask: Any, field: Callable[[Float32], Any], at: Any = None) -> Float32:
-        """Return a field of places (j, 3) at the texels where a mask (k,) is not 0, and 0 elsewhere, (k,)."""
+        """Return a function of positions (j, 3) at the texels where a mask (k,) is not 0, and 0 elsewhere."""
         at = self.at if at is None else at
         out = np.zeros(len(at), np.float32)
         some = slice(None) if mask is None else np.asarray(mask) != 0
@@ -114,25 +114,25 @@ class Skin:
         """Return values of the base mesh's vertices (n, ...) at the texels (k, ...)."""
         return self.texels.spread(self.part.submesh.mix @ np.asarray(values, float))
 
-    def around(self, *names: str, radii: Any, off: Any = (0, 0, 0)) -> Float32:
-        """Return 0..1 (k,): 1 at feature points and off them, 0 outside ellipsoids around them."""
-        ground = self.person.ground
+    def around(self, *names: str, radii: Any, offset: Any = (0, 0, 0)) -> Float32:
+        """Return weights (k,) that fall from 1 at feature points (plus an offset) to 0 on ellipsoids."""
+        figure = self.person.figure
 
         def field(at: Float32) -> Any:
             out = np.zeros(len(at))
             for name in names:
-                place = ground.point(name)
-                middle = place + np.asarray(off) * [np.sign(place[0]) or 1, 1, 1]
-                away = np.linalg.norm((at - middle) / np.asarray(radii), axis=1)
-                out = np.maximum(out, (1 + np.cos(np.pi * np.clip(away, 0, 1))) / 2)
+                position = figure.point(name)
+                middle = position + np.asarray(offset) * [np.sign(position[0]) or 1, 1, 1]
+                distance = np.linalg.norm((at - middle) / np.asarray(radii), axis=1)
+                out = np.maximum(out, (1 + np.cos(np.pi * np.clip(distance, 0, 1))) / 2)
             return out
 
         return self.texels.broad(field)
 
     def normals(self) -> Float32:
         """Return unit normals of the texels, (k, 3)."""
-        ups = self.texels.spread(vertex_normals(self.part.vertices, self.part.triangles))
-        return self.float(ups / np.maximum(np.linalg.norm(ups, axis=1, keepdims=True), 1e-9))
+        normals_ = self.texels.spread(vertex_normals(self.part.vertices, self.part.triangles))
+        return self.float(normals_ / np.maximum(np.linalg.norm(normals_, axis=1, keepdims=True), 1e-9))
 
     @staticmethod
     def float(values: Any) -> Float32:
@@ -141,34 +141,34 @@ class Skin:
 
     def margins(self) -> tuple[Float32, Float32]:
         """Return the wet edges of the lids, and the caruncles in the inner corners, 0..1 (k,) each."""
-        edge = np.zeros(len(self.person.ground.at))
+        edge = np.zeros(len(self.person.figure.at))
         for lid in self.lids:
             edge[lid.rings[0]] = 1
         corners = self.around("3.8", "3.11", radii=(0.0045, 0.0032, 0.0050))
         return self.field(edge), self.float(smooth(corners, 0.15, 0.6))
 
     def oily(self) -> Float32:
-        """Return where the skin is oily and its pores are large, 0..1 (k,): nose, forehead, chin."""
+        """Return the weight (k,) 0..1 of oily skin: nose, forehead, chin."""
         nose = self.around("9.3", radii=(0.022, 0.020, 0.03))
         wings = self.around("9.1", "9.2", radii=(0.016, 0.018, 0.02))
-        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), off=(0, 0.035, 0))
+        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), offset=(0, 0.035, 0))
         chin = self.around("2.10", radii=(0.020, 0.016, 0.03))
         return self.float(np.clip(nose + wings + 0.55 * brow + 0.5 * chin, 0, 1))
 
     def pored(self) -> Float32:
-        """Return where pores are large, 0..1 (k,): the nose and the cheeks beside it."""
+        """Return the weight (k,) 0..1 of large pores: on the nose and the cheeks beside it."""
         nose = self.around("9.3", "9.1", "9.2", radii=(0.022, 0.022, 0.03))
-        cheeks = self.around("5.3", "5.4", radii=(0.034, 0.030, 0.05), off=(-0.012, 0, 0.01))
-        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), off=(0, 0.035, 0))
+        cheeks = self.around("5.3", "5.4", radii=(0.034, 0.030, 0.05), offset=(-0.012, 0, 0.01))
+        brow = self.around("9.12", radii=(0.045, 0.050, 0.05), offset=(0, 0.035, 0))
         chin = self.around("2.10", radii=(0.022, 0.018, 0.03))
         pored = self.float(np.clip(nose + 0.75 * cheeks + 0.4 * brow + 0.5 * chin, 0, 1))
         return pored * self.dry * (1 - self.red)
 
     def mark(self, name: str, mask: Any, number: int) -> Any:
-        """Return texels (c,) in the middle of marks of the table, and radii (c,): small ones more often.
+        """Return centres (c,), as texels, and radii (c,) of random marks of a kind in the table.
 
         Args:
-            mask: (k,) 0..1, where they are.
+            mask: (k,) 0..1, relative density.
         """
         row, rng = self.table[name], self.rng(number)
         least, most = row["radius"]
@@ -177,20 +177,20 @@ class Skin:
 
 
 def distance_through(vertices: Float64, normals: Float64, among: Any, full: float) -> Float64:
-    """Return metres (n,) from each vertex to one of those `among` that lie behind it and face away.
+    """Return the thickness (n,) in metres: the distance from each vertex to the opposite surface behind it.
 
     Args:
-        among: (j,) vertices; full: metres, the most.
+        among: (j,) vertices of the opposite surface; full: metres, the maximum.
     """
     from scipy.spatial import cKDTree
 
     out = np.full(len(vertices), full)
     near = cKDTree(vertices[among]).query_ball_point(vertices, full)
     for k, found in enumerate(near):
-        others = among[found]
-        way = vertices[others] - vertices[k]
-        away = np.linalg.norm(way, axis=1)
-        behind = (normals[others] @ normals[k] < -0.2) & (-way @ normals[k] > 0.6 * away)
+        candidates = among[found]
+        offset = vertices[candidates] - vertices[k]
+        distance = np.linalg.norm(offset, axis=1)
+        behind = (normals[candidates] @ normals[k] < -0.2) & (-offset @ normals[k] > 0.6 * distance)
         if behind.any():
-            out[k] = away[behind].min()
+            out[k] = distance[behind].min()
     return out

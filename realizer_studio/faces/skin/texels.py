@@ -1,4 +1,4 @@
-"""The texels of a map that lie on a surface, and where they are on it."""
+"""The texels of a map that lie on a surface, and their positions."""
 
 from collections.abc import Callable
 from functools import cached_property
@@ -10,7 +10,7 @@ from realizer.core.array_types import Bool, Float32, Float64, Index, Int32
 from realizer.face.mesh_geometry import flat_cross, triangle_normals
 
 PAD = 8  # texels around an island that repeat its edge
-COARSE = 4  # texels between the samples of what changes slowly
+COARSE = 4  # texels between the samples of slowly varying fields
 
 
 class Texels:
@@ -19,16 +19,15 @@ class Texels:
     Attributes:
         size: texels of a side of the map.
         flat: (k,) index of each texel in the map.
-        triangle: (k,) the triangle that it is on; weights: (k, 3) of the triangle's corners.
-        at: (k, 3) metres.
-        width: (k,) metres of a texel.
+        triangle: (k,) the triangle of each texel; weights: (k, 3) of the triangle's corners.
+        at: (k, 3) metres, positions.
+        width: (k,) metres, the width of a texel.
     """
 
     def __init__(self, vertices: Float64, triangles: Int32, corners: Float64, size: int) -> None:
-        """Find the texels.
-
+        """
         Args:
-            vertices: (n, 3) metres; triangles: (m, 3); corners: (m, 3, 2) places in the map, 0..1.
+            vertices: (n, 3) metres; triangles: (m, 3); corners: (m, 3, 2) texture coordinates, 0..1.
         """
         from scipy.ndimage import distance_transform_edt
 
@@ -45,7 +44,7 @@ class Texels:
         self.width = self.spread(_widths(vertices, triangles, corners * size))
 
     def spread(self, values: Any) -> Float32:
-        """Return values of the surface's vertices (n, ...) at the texels, (k, ...) float32."""
+        """Interpolate values of the surface's vertices (n, ...) at the texels, (k, ...) float32."""
         values = np.asarray(values, np.float32)
         ends = self._triangles[self.triangle]
         shape = (-1,) + (1,) * (values.ndim - 1)
@@ -64,80 +63,80 @@ class Texels:
         return out.reshape(self.size, self.size, *values.shape[1:])
 
     def blurred(self, values: Float32, radius: float) -> Float32:
-        """Return values (k,) softened over so many texels, each island by itself."""
+        """Return values (k,) blurred by a radius in texels, each island separately."""
         from scipy.ndimage import gaussian_filter
 
         cover = np.zeros((self.size, self.size), np.float32)
-        whole = cover.copy()
-        whole.ravel()[self.flat], cover.ravel()[self.flat] = values, 1
-        whole, cover = (gaussian_filter(part, radius, truncate=2.5) for part in (whole, cover))
-        return np.asarray(whole.ravel()[self.flat] / cover.ravel()[self.flat])
+        image = cover.copy()
+        image.ravel()[self.flat], cover.ravel()[self.flat] = values, 1
+        image, cover = (gaussian_filter(part, radius, truncate=2.5) for part in (image, cover))
+        return np.asarray(image.ravel()[self.flat] / cover.ravel()[self.flat])
 
     def broad(self, field: Callable[[Float32], Any]) -> Float32:
-        """Return a field that changes slowly, (k,): computed at few places (j, 3) and interpolated."""
-        places, cover = self._coarse
-        inside = np.isfinite(places[..., 0])
-        coarse = np.zeros(places.shape[:2], np.float32)
-        coarse[inside] = field(places[inside])
+        """Return a slowly varying field (k,), computed at few positions (j, 3) and interpolated."""
+        positions, cover = self._coarse
+        inside = np.isfinite(positions[..., 0])
+        coarse = np.zeros(positions.shape[:2], np.float32)
+        coarse[inside] = field(positions[inside])
         return np.asarray(self._fine(coarse) / cover)
 
     @cached_property
     def _coarse(self) -> tuple[Float32, Float32]:
-        """The few places (j, j, 3), NaN outside, and how much of a texel is interpolated of those inside."""
-        places = self.picture(self.at, np.nan)[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
-        return places, np.maximum(self._fine(np.isfinite(places[..., 0]).astype(np.float32)), 0.05)
+        """The sampled positions (j, j, 3), NaN outside islands, and the inner ones' weight at each texel."""
+        positions = self.picture(self.at, np.nan)[COARSE // 2 :: COARSE, COARSE // 2 :: COARSE]
+        return positions, np.maximum(self._fine(np.isfinite(positions[..., 0]).astype(np.float32)), 0.05)
 
     def _fine(self, coarse: Float32) -> Float32:
         from scipy.ndimage import zoom
 
-        whole = zoom(coarse, COARSE, order=1, grid_mode=True, mode="nearest")
-        return np.asarray(whole.ravel()[self.flat], np.float32)
+        image = zoom(coarse, COARSE, order=1, grid_mode=True, mode="nearest")
+        return np.asarray(image.ravel()[self.flat], np.float32)
 
     def stamp(self, centres: Any, radius: Float32, shape: Callable[[Any], Any]) -> Float32:
-        """Return the largest of marks at each texel, (k,).
+        """Return the maximum of marks at each texel, (k,).
 
         Args:
-            centres: (c,) texels in the middle of a mark.
+            centres: (c,) texels, the centres of the marks.
             radius: (c,) metres.
-            shape: distance from the middle in radii -> value, 0 from 1 on.
+            shape: profile of a mark: distance from its centre in radii -> value.
         """
         out = np.zeros(self.size * self.size, np.float32)
-        place = np.full((self.size * self.size, 3), np.nan, np.float32)
-        place[self.flat] = self.at
+        positions = np.full((self.size * self.size, 3), np.nan, np.float32)
+        positions[self.flat] = self.at
         reach = np.ceil(1.6 * radius / self.width[centres]).astype(int)
         for r in np.unique(reach):
-            mine = centres[reach == r]
+            group = centres[reach == r]
             y, x = np.mgrid[-r : r + 1, -r : r + 1]
             step = (y * self.size + x).ravel()
             some = max(1, 400_000 // len(step))
-            for first in range(0, len(mine), some):
+            for first in range(0, len(group), some):
                 part = slice(first, first + some)
-                index = (self.flat[mine[part], None] + step).clip(0, len(out) - 1)
-                off = np.linalg.norm(place[index] - self.at[mine[part], None], axis=2)
-                away = off / radius[reach == r][part, None]
-                value = np.where(away < 1, shape(np.minimum(np.nan_to_num(away, nan=1.0), 1)), 0)
+                index = (self.flat[group[part], None] + step).clip(0, len(out) - 1)
+                lengths = np.linalg.norm(positions[index] - self.at[group[part], None], axis=2)
+                relative = lengths / radius[reach == r][part, None]
+                value = np.where(relative < 1, shape(np.minimum(np.nan_to_num(relative, nan=1.0), 1)), 0)
                 np.maximum.at(out, index.ravel(), value.ravel().astype(np.float32))
         return out[self.flat]
 
     def scatter(self, density: Float32, apart: float, rng: np.random.Generator) -> Any:
-        """Return texels (c,) at random places.
+        """Return random texels (c,).
 
         Args:
-            density: (k,) places a square metre.
-            apart: metres between two places at least.
+            density: (k,) texels per square metre.
+            apart: metres, the least distance between two of them.
         """
         from scipy.spatial import cKDTree
 
-        mine = np.flatnonzero(rng.random(len(density)) < density * self.width**2)
-        mine = rng.permutation(mine)
-        pairs = cKDTree(self.at[mine]).query_pairs(apart, output_type="ndarray")
-        gone: Bool = np.zeros(len(mine), bool)
-        gone[pairs.max(axis=1)] = True  # the later one gives way
-        return mine[~gone]
+        candidates = np.flatnonzero(rng.random(len(density)) < density * self.width**2)
+        candidates = rng.permutation(candidates)
+        pairs = cKDTree(self.at[candidates]).query_pairs(apart, output_type="ndarray")
+        removed: Bool = np.zeros(len(candidates), bool)
+        removed[pairs.max(axis=1)] = True  # of two close ones, the later is removed
+        return candidates[~removed]
 
 
 def _covered(corners: Float64, size: int) -> tuple[Index, Int32, Float32]:
-    """Return the texels whose middles lie in triangles (m, 3, 2): index, triangle, weights of its corners."""
+    """Return the texels with centres in triangles (m, 3, 2): index, triangle, weights of its corners."""
     flat, number, weights = [], [], []
     low = np.ceil(corners.min(axis=1)).clip(0, size - 1).astype(int)
     high = np.floor(corners.max(axis=1)).clip(0, size - 1).astype(int) + 1
@@ -163,7 +162,7 @@ def _covered(corners: Float64, size: int) -> tuple[Index, Int32, Float32]:
 
 
 def _widths(vertices: Float64, triangles: Int32, corners: Float64) -> Float64:
-    """Return how many metres a texel is wide about each vertex, (n,)."""
+    """Return the width of texels around each vertex in metres, (n,)."""
     area = np.linalg.norm(triangle_normals(vertices, triangles), axis=1)
     p, q = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     flat = np.abs(flat_cross(p, q))

@@ -13,7 +13,7 @@ from realizer_studio.tracking.markers.colours import Colour
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-MERGED = 9.0  # pixels between the middles of blobs of one marker
+MERGED = 9.0  # pixels; the largest distance between the centres of blobs of one marker
 SQUARE = np.ones((3, 3), bool)
 X, Y, COLOUR = 0, 1, 2  # columns of blobs
 Box = tuple[int, int, int, int]
@@ -22,23 +22,25 @@ Box = tuple[int, int, int, int]
 def blobs(picture: Image, colours: Sequence[Colour], region: Box | None = None) -> Float64:
     """Return the blobs (n, 3) of a picture: x, y in pixels from the top left corner, and the colour, from 0.
 
-    Of the second colour, which is painted on the lids, the place is the middle of the upper edge (eq. 7.4);
-    of the others, it is the centre of gravity (eq. 7.3).
+    The position is the centroid (eq. 7.3), or, for the second colour, which is painted on the lids, the
+    centre of the upper edge (eq. 7.4).
 
     Args:
-        region: left, top, right and bottom of the part that has markers; None is all of it.
+        region: left, top, right and bottom of the part with markers; None for the whole picture.
     """
     left, top = region[:2] if region is not None else (0, 0)
     hsv = (picture.crop(region) if region is not None else picture).convert("HSV")
     parts = []
     for number, colour in enumerate(colours):
-        places = _places(colour.mask(hsv), upper_edge=number == 1)
-        parts.append(np.column_stack([places + np.array([left, top]), np.full(len(places), float(number))]))
+        positions = _blob_positions(colour.mask(hsv), upper_edge=number == 1)
+        parts.append(
+            np.column_stack([positions + np.array([left, top]), np.full(len(positions), float(number))])
+        )
     return np.concatenate(parts)
 
 
-def _places(mask: Bool, *, upper_edge: bool) -> Float64:
-    """Return the places (n, 2) of the blobs of a mask, those of one marker merged."""
+def _blob_positions(mask: Bool, *, upper_edge: bool) -> Float64:
+    """Return the positions (n, 2) of the blobs of a mask, with those of one marker merged."""
     from scipy import ndimage
 
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
@@ -46,32 +48,32 @@ def _places(mask: Bool, *, upper_edge: bool) -> Float64:
         return np.zeros((0, 2))
     top, left = int(rows[0]), int(columns[0])
     part = np.pad(mask[top : rows[-1] + 1, left : columns[-1] + 1], 1)
-    # Erosion, then dilation: what is narrower than three pixels goes, and borders become smooth.
-    marks, count = ndimage.label(_spread(~_spread(~part)), SQUARE)
+    # Erosion, then dilation, removes parts narrower than three pixels, and smooths borders.
+    marks, count = ndimage.label(_dilated(~_dilated(~part)), SQUARE)
     y, x = np.nonzero(marks)
-    which = marks[y, x] - 1
-    sizes = np.bincount(which, minlength=count).astype(np.float64)
-    middles = np.stack([np.bincount(which, values, count) / sizes for values in (x, y)], axis=1)
+    label = marks[y, x] - 1
+    sizes = np.bincount(label, minlength=count).astype(np.float64)
+    middles = np.stack([np.bincount(label, values, count) / sizes for values in (x, y)], axis=1)
     edges = np.full(count, np.inf)
-    np.minimum.at(edges, which, y)
-    group = _merged(middles)
+    np.minimum.at(edges, label, y)
+    group = _groups(middles)
     total = np.bincount(group, sizes)
-    places = np.stack([np.bincount(group, sizes * axis) / total for axis in middles.T], axis=1)
+    positions = np.stack([np.bincount(group, sizes * axis) / total for axis in middles.T], axis=1)
     if upper_edge:
-        places[:, 1] = np.inf
-        np.minimum.at(places[:, 1], group, edges)
-    return np.asarray(places + (left - 1.0, top - 1.0))  # noqa: RUF005
+        positions[:, 1] = np.inf
+        np.minimum.at(positions[:, 1], group, edges)
+    return np.asarray(positions + (left - 1.0, top - 1.0))  # noqa: RUF005
 
 
-def _spread(mask: Bool) -> Bool:
-    """Return a mask dilated by 3 x 3 pixels; that of the opposite is an erosion."""
+def _dilated(mask: Bool) -> Bool:
+    """Return a mask dilated by 3 x 3 pixels."""
     wide = np.pad(mask, 1)
     wide = wide[1:-1] | wide[:-2] | wide[2:]
     return np.asarray(wide[:, 1:-1] | wide[:, :-2] | wide[:, 2:])
 
 
-def _merged(middles: Float64) -> Index:
-    """Return the number of the group (n,) that each blob belongs to."""
+def _groups(middles: Float64) -> Index:
+    """Return the number (n,) of each blob's group."""
     from scipy.sparse.csgraph import connected_components
 
     near = np.linalg.norm(middles[:, None] - middles, axis=-1) < MERGED

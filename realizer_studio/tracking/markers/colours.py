@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 FULL = np.array([360.0, 100.0, 100.0])  # degrees, per cent, per cent
 SPREAD = (18.0, 25.0, 30.0)  # of a colour that is given by three numbers
-LEAST = (15.0, 25.0, 28.0)  # spread of a colour that is learnt: light changes over a face
-MORE = 1.5  # spread of what is learnt, relative to the farthest of its pixels
-AROUND = 1  # pixels on each side of a clicked one; their median is learnt
-SAME = 40.0  # degrees of hue between pixels of one colour
+LEAST = (15.0, 25.0, 28.0)  # least spread of a learnt colour, because light varies over a face
+MORE = 1.5  # spread of a learnt colour, relative to the farthest of its pixels
+AROUND = 1  # pixels on each side of a clicked one, of which the median is learnt
+SAME = 40.0  # degrees; the largest difference of hue between pixels of one colour
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,11 +28,11 @@ class Colour:
 
     name: str  # for messages
     centre: tuple[float, float, float]  # hue in degrees, saturation and value in per cent
-    # The distances from the centre, of each, up to which a pixel has the colour.
+    # The largest differences from the centre.
     spread: tuple[float, float, float] = SPREAD
 
     def mask(self, hsv: Image) -> Bool:
-        """Return which pixels (h, w) of a picture in Pillow's mode HSV have the colour."""
+        """Return the mask (h, w) of the pixels of a picture in Pillow's mode HSV that have the colour."""
         from PIL import ImageChops
 
         levels = np.arange(256)[:, None] * FULL / [256, 255, 255] - self.centre
@@ -59,7 +59,7 @@ NAMED = {
 
 
 def named(name: str) -> Colour:
-    """Return a colour by its name; raises TrackingError: none of `NAMED`."""
+    """Return a colour of `NAMED` by its name; raises TrackingError for other names."""
     if (colour := NAMED.get(name.strip().lower())) is None:
         raise TrackingError(
             f"marker colours: wanted some of {', '.join(NAMED)}, got {name!r}; other colours are given by "
@@ -70,34 +70,34 @@ def named(name: str) -> Colour:
 
 def of_numbers(text: str) -> Colour:
     """Return the colour of "H,S,V" or "H,S,V,SPREAD_H,SPREAD_S,SPREAD_V"; raises TrackingError."""
-    wanted = (
+    expectation = (
         "--marker-colour: wanted H,S,V (0 to 360 degrees, 0 to 100, 0 to 100 per cent) and, if you like, "
         f"three spreads above 0, got {text!r}"
     )
     try:
         cells = [float(cell) for cell in text.split(",")]
     except ValueError:
-        raise TrackingError(wanted) from None
+        raise TrackingError(expectation) from None
     good = len(cells) in (3, 6) and np.isfinite(cells).all() and all(cell > 0 for cell in cells[3:])
     if not good or not all(0 <= cell <= most for cell, most in zip(cells, FULL, strict=False)):
-        raise TrackingError(wanted)
+        raise TrackingError(expectation)
     centre, spread = cells[:3], cells[3:] or SPREAD
     return Colour(text, (centre[0], centre[1], centre[2]), (spread[0], spread[1], spread[2]))
 
 
-def learnt(picture: Image, places: Sequence[tuple[float, float]], where: str) -> list[Colour]:
-    """Return the colours of a picture around pixels: clicks of similar hues are one colour, learnt together.
+def learnt(picture: Image, pixels: Sequence[tuple[float, float]], where: str) -> list[Colour]:
+    """Return the colours of a picture around clicked pixels; those of similar hues make one colour.
 
     Args:
-        places: x, y in pixels from the top left corner, one or more inside markers of each colour.
+        pixels: x, y in pixels from the top left corner, one or more inside markers of each colour.
         where: name of the picture in messages.
 
     Raises:
-        TrackingError: a place outside the picture, or without a colour.
+        TrackingError: a pixel outside the picture, or a grey one.
     """
     hsv = np.asarray(picture.convert("HSV"), np.float64) * FULL / [256, 255, 255]
     groups: list[list[Float64]] = []
-    for x, y in places:
+    for x, y in pixels:
         column, row = round(x), round(y)
         if not (0 <= column < picture.width and 0 <= row < picture.height):
             raise TrackingError(
@@ -128,5 +128,5 @@ def _learnt(pixels: Float64) -> Colour:
 
 
 def _hues(hues: Any, origin: float) -> Any:
-    """Return the differences of hues to one, -180 to 180 degrees."""
+    """Return the differences of hues from one, -180 to 180 degrees."""
     return (hues - origin + 180) % 360 - 180

@@ -1,4 +1,4 @@
-"""Markers of a film: found, ordered, repaired and without the motion of the head; and their files."""
+"""Tracking of markers in a film: detection, ordering, repair, removal of head motion; their files."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -25,22 +25,22 @@ from realizer_studio.tracking.network import TrackingError
 from realizer_studio.tracking.pictures import Picture
 from realizer_studio.tracking.recording import rate_of
 
-USUAL = 0.9  # of the pictures have at most as many blobs as there are markers
-TRIED = 40  # pictures in which the face is looked for
-GOOD = 0.12  # distance of markers from the layout that is taken for theirs, relative to its size
-UP = np.array([1.0, -1.0])  # rows of pictures go down
-SIDES = ("left", "right", "up", "down")  # what is seen from the front
+USUAL = 0.9  # quantile of the number of blobs that is taken as the number of markers
+TRIED = 40  # pictures in which the layout is searched
+GOOD = 0.12  # largest mean distance of markers from a fitting layout, relative to its size
+UP = np.array([1.0, -1.0])  # from pictures (y down) to layouts (y up)
+SIDES = ("left", "right", "up", "down")  # directions that are measurable from the front
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """What markers look like."""
+class MarkerSettings:
+    """The settings for tracking markers."""
 
     colours: Sequence[Colour]  # of the markers; the second one is the paint on the lids
-    # Of the points, in any unit; None: Wojdel's 31 points if they fit, or else numbers.
+    # Of the points, in any unit; None for Wojdel's 31 points if they fit, or else numbered points.
     layout: Layout | None = None
     region: Box | None = None  # left, top, right, bottom in pixels; None is the whole picture
-    # Number of the picture that shows the face at rest; None looks for one with all markers.
+    # Number of the picture with the face at rest; None to search one with all markers.
     neutral: int | None = None
 
 
@@ -49,43 +49,45 @@ class Markers:
     """Markers at an even rate."""
 
     fps: float  # frames a second
-    layout: Layout  # names, and places at rest without the head's pose
+    layout: Layout  # names, and positions at rest without the head's pose
     pixels: Float64  # (n, k, 2) x right, y down
-    points: Float64  # (n, k, 2) without the head's place, size and roll; x to the person's left, y up
-    seen: Bool  # (n, k) whether a point was seen; the others are repaired
+    points: Float64  # (n, k, 2) without the head's position, size and roll; x to the person's left, y up
+    visible: Bool  # (n, k) whether a point was seen; the others are repaired
 
 
-def track_markers(pictures: Iterable[Picture], look: Look, where: str, fps: float | None = None) -> Markers:
+def track_markers(
+    pictures: Iterable[Picture], settings: MarkerSettings, where: str, fps: float | None = None
+) -> Markers:
     """Return the markers in pictures.
 
     Args:
         where: name of the film in messages.
-        fps: the rate of the result; None takes that of the pictures.
+        fps: the rate of the result; None for that of the pictures.
 
     Raises:
-        TrackingError: no markers, or others than those of the layout.
+        TrackingError: no markers, or markers that do not fit the layout.
     """
     times, found = [], []
     for picture in pictures:
         times.append(picture.time)
-        found.append(blobs(picture.image, look.colours, look.region) * (*UP, 1.0))
-    layout, start = _at_rest(found, look, where)
-    places = order(found, layout, start)
+        found.append(blobs(picture.image, settings.colours, settings.region) * (*UP, 1.0))
+    layout, start = _initial_layout(found, settings, where)
+    positions = order(found, layout, start)
     rate = fps or rate_of(times)
-    even = np.arange(int(times[-1] * rate + 1e-6) + 1) / rate
-    whole = _at_times(repaired(places), np.asarray(times), even)
-    there = np.isfinite(
-        places[np.searchsorted(np.asarray(times), even - 0.5 / rate).clip(0, len(times) - 1), :, 0]
+    even_times = np.arange(int(times[-1] * rate + 1e-6) + 1) / rate
+    complete = _resampled(repaired(positions), np.asarray(times), even_times)
+    visible = np.isfinite(
+        positions[np.searchsorted(np.asarray(times), even_times - 0.5 / rate).clip(0, len(times) - 1), :, 0]
     )
-    rest = normalised(layout, np.concatenate([whole, layout.places[None]]))
-    return Markers(rate, layout.at(rest[-1]), whole * UP, rest[:-1], there)
+    rest = normalised(layout, np.concatenate([complete, layout.positions[None]]))
+    return Markers(rate, layout.with_positions(rest[-1]), complete * UP, rest[:-1], visible)
 
 
 def faps_of(markers: Markers, face: str = "default") -> tuple[Float64, Bool]:
-    """Return the FAPs (n, 68) that feature points among the markers show, and which of the FAPs those are.
+    """Return the FAPs (n, 68) of feature points among the markers, and (68,) whether each FAP is measured.
 
-    The markers at rest are laid on the feature points of a face, whose units measure their motion. Motion
-    towards the camera is not seen.
+    The layout at rest is fitted to the feature points of a face, which gives the unit of motion. Motion
+    towards the camera is not measured.
 
     Raises:
         TrackingError: no feature points among the markers.
@@ -96,58 +98,60 @@ def faps_of(markers: Markers, face: str = "default") -> tuple[Float64, Bool]:
             "wanted two feature points of MPEG-4 or more among the markers, for FAPs; see --layout"
         )
     head = load_face(face)
-    shown = list(names.values())
-    places = np.array([head.points[name] for name in names], np.float64)
-    rest = markers.layout.places[shown]
-    a, b = rest - rest.mean(axis=0), places[:, :2] - places[:, :2].mean(axis=0)
+    indices = list(names.values())
+    positions = np.array([head.points[name] for name in names], np.float64)
+    rest = markers.layout.positions[indices]
+    a, b = rest - rest.mean(axis=0), positions[:, :2] - positions[:, :2].mean(axis=0)
     metres = float((a * b).sum() / max(np.square(a).sum(), 1e-12))
-    moved = np.zeros((len(markers.points), len(shown), 3))
-    moved[:, :, :2] = (markers.points[:, shown] - rest) * metres
-    now = {name: (places + moved)[:, k] for k, name in enumerate(names)}
-    values, seen = faps_from_points(now, dict(zip(names, places, strict=True)), head.fapu)
-    flat = np.array([row.direction in SIDES for row in fap_rows()])
-    flat[HEAD_COLUMNS] = False
-    return np.where(flat, values, 0.0).astype(np.float64), seen & flat
+    moved = np.zeros((len(markers.points), len(indices), 3))
+    moved[:, :, :2] = (markers.points[:, indices] - rest) * metres
+    moved_points = {name: (positions + moved)[:, k] for k, name in enumerate(names)}
+    values, observed = faps_from_points(moved_points, dict(zip(names, positions, strict=True)), head.fapu)
+    measurable = np.array([row.direction in SIDES for row in fap_rows()])
+    measurable[HEAD_COLUMNS] = False
+    return np.where(measurable, values, 0.0).astype(np.float64), observed & measurable
 
 
-def _at_rest(found: Sequence[Float64], look: Look, where: str) -> tuple[Layout, int]:
-    """Return the layout in pixels (y up), and the number of the picture where it lies there."""
+def _initial_layout(found: Sequence[Float64], settings: MarkerSettings, where: str) -> tuple[Layout, int]:
+    """Return the layout in pixels (y up), and the number of the picture where it was found."""
     counts = np.array([len(some) for some in found])
     usual = int(np.quantile(counts, USUAL, method="nearest")) if len(counts) else 0
-    colours = ", ".join(colour.name for colour in look.colours)
+    colours = ", ".join(colour.name for colour in settings.colours)
     if usual < 3:
         raise TrackingError(
             f"{where}: wanted markers of the colours {colours}, found {usual} in most pictures; "
             "click on some by --marker-at X,Y"
         )
-    near = np.argsort(
-        np.abs(counts - (len(look.layout) if look.layout is not None else usual)), kind="stable"
+    candidates = np.argsort(
+        np.abs(counts - (len(settings.layout) if settings.layout is not None else usual)), kind="stable"
     )
-    tried = [look.neutral] if look.neutral is not None else near[:TRIED].tolist()
+    tried = [settings.neutral] if settings.neutral is not None else candidates[:TRIED].tolist()
     if not 0 <= tried[0] < len(found):
         raise TrackingError(
             f"{where}: wanted a picture from 0 to {len(found) - 1} as --neutral, got {tried[0]}"
         )
-    known = look.layout or (wojdel() if usual == len(wojdel()) else None)
-    if known is not None:
-        known = known.with_colours(len(look.colours))
-        fits = [(locate(known, found[k]), k) for k in tried]
-        (placed, off), start = min(fits, key=lambda fit: fit[0][1])
-        if placed is not None and off < GOOD * known.at(placed).size:
-            return known.at(nearest(placed, known, found[start])), start
-        if look.layout is not None:
+    layout_ = settings.layout or (wojdel() if usual == len(wojdel()) else None)
+    if layout_ is not None:
+        layout_ = layout_.with_colours(len(settings.colours))
+        fits = [(locate(layout_, found[k]), k) for k in tried]
+        (positions, error), start = min(fits, key=lambda fit: fit[0][1])
+        if positions is not None and error < GOOD * layout_.with_positions(positions).size:
+            return layout_.with_positions(nearest(positions, layout_, found[start])), start
+        if settings.layout is not None:
             raise TrackingError(
-                f"{where}: wanted the {len(known)} markers of the layout, found {usual} of {colours} that "
+                f"{where}: wanted the {len(layout_)} markers of the layout, found {usual} of {colours} that "
                 "do not lie like them; see --layout, --marker-at and --region"
             )
     start = tried[0]
     return numbered(found[start] * (*UP, 1.0)), start
 
 
-def _at_times(places: Float64, times: Float64, even: Float64) -> Float64:
-    """Return places (n, k, 2) at other times."""
-    flat = places.reshape(len(places), -1)
-    return np.stack([np.interp(even, times, way) for way in flat.T], axis=1).reshape(-1, *places.shape[1:])
+def _resampled(positions: Float64, times: Float64, even_times: Float64) -> Float64:
+    """Return positions (n, k, 2) interpolated at other times."""
+    flat = positions.reshape(len(positions), -1)
+    return np.stack([np.interp(even_times, times, coordinate) for coordinate in flat.T], axis=1).reshape(
+        -1, *positions.shape[1:]
+    )
 
 
 def _csv(markers: Markers, face: str, name: str) -> str:
@@ -166,10 +170,10 @@ def _json(markers: Markers, face: str, name: str) -> str:
         "frames": len(markers.points),
         "names": markers.layout.names,
         "feature_points": markers.layout.feature_points,
-        "neutral": markers.layout.places.round(5).tolist(),
+        "neutral": markers.layout.positions.round(5).tolist(),
         "points": markers.points.round(5).tolist(),
         "pixels": markers.pixels.round(2).tolist(),
-        "seen": markers.seen.tolist(),
+        "seen": markers.visible.tolist(),
     }
     return json.dumps(content) + "\n"
 

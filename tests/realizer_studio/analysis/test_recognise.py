@@ -134,7 +134,7 @@ def test_names_call_a_smile_that_shows_the_teeth_joy(units: dict[int, float]) ->
 
 def test_intervals_leave_out_when_no_face_is_seen() -> None:
     frames, there = np.zeros((50, 68)), np.repeat([True, False, True], [10, 20, 20])
-    found = recogniser().intervals(frames, 10, there=there)
+    found = recogniser().intervals(frames, 10, visible=there)
     assert [(part.start, part.end, part.emotion) for part in found] == [
         (0.0, 1.0, "neutral"),
         (3.0, 5.0, "neutral"),

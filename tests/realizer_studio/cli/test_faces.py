@@ -171,7 +171,7 @@ def test_photo_passes_on_what_is_told(
     done = run("faces", "photo", *pictures, "-o", str(tmp_path / "mia"), *given)
     assert (done.returncode, done.stdout) == (0, "")
     assert "mia: fit ...\n" in done.stderr
-    told = {"told": {"age": 40.0, "hair": "red"}, "hair": "bob"}
+    told = {"sliders": {"age": 40.0, "hair": "red"}, "hair": "bob"}
     assert calls == [(*map(Path, pictures), tmp_path / "mia", tmp_path, told)]
 
 

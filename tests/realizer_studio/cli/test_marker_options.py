@@ -9,7 +9,7 @@ import click
 import pytest
 from PIL import Image
 
-from realizer_studio.cli.marker_options import Numbers, follow, look_of
+from realizer_studio.cli.marker_options import Numbers, follow, marker_settings
 from tests.painted import acted, plain, truth
 
 NONE = {"markers": None, "marker_colour": (), "marker_at": (), "layout": None, "region": None}
@@ -33,14 +33,14 @@ def test_numbers_are_pixels_with_commas() -> None:
 )
 def test_look_of_has_the_colours(tmp_path: Path, chosen: dict[str, Any], names: list[str] | None) -> None:
     Image.new("RGB", (10, 10), (20, 20, 200)).save(tmp_path / "blue.png")
-    look = look_of(tmp_path / "blue.png", NONE | chosen, None)
+    look = marker_settings(tmp_path / "blue.png", NONE | chosen, None)
     assert (None if look is None else [colour.name for colour in look.colours]) == names
 
 
 def test_follow_reads_the_film(tmp_path: Path) -> None:
     for k, picture in enumerate(plain(truth("ada", acted(3)))):
         picture.image.save(tmp_path / f"{k}.png")
-    look = look_of(tmp_path, NONE | {"markers": "green,blue"}, 0)
+    look = marker_settings(tmp_path, NONE | {"markers": "green,blue"}, 0)
     assert look is not None
     with click.Context(click.Command("track")):
         assert follow(tmp_path, look, 10).pixels.shape == (3, 31, 2)

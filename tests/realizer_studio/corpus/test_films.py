@@ -8,7 +8,7 @@ import pytest
 from realizer_studio.corpus.films import films, to_track, with_markers
 from realizer_studio.corpus.recording import Annotation, CorpusError, Recording, write_recording
 from realizer_studio.tracking.markers.colours import named
-from realizer_studio.tracking.markers.film import Look, track_markers
+from realizer_studio.tracking.markers.film import MarkerSettings, track_markers
 from tests.painted import acted, plain, truth
 
 
@@ -35,7 +35,7 @@ def test_to_track_keeps_what_is_half_written_and_skips_what_is_done(tmp_path: Pa
 
 
 def test_with_markers_adds_points_and_faps() -> None:
-    look = Look((named("green"), named("blue")))
+    look = MarkerSettings((named("green"), named("blue")))
     markers = track_markers(plain(truth("ada", acted(6))), look, "film")
     found = with_markers(Recording("one", {"person": "eva"}), markers, "ada")
     assert found.points is not None

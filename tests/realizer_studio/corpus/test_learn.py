@@ -41,7 +41,7 @@ def test_learn_keeps_nine_tenths_of_the_variance() -> None:
     recording = acted(0)
     learnt = learn([recording])
     frames = features(recording) - learnt.mean
-    kept = np.square(learnt.places(features(recording))).sum() / np.square(frames).sum()
+    kept = np.square(learnt.project(features(recording))).sum() / np.square(frames).sum()
     fewer = np.square(frames @ learnt.components[:-1].T).sum() / np.square(frames).sum()
     assert fewer < 0.9 <= kept
     assert np.allclose(learnt.components @ learnt.components.T, np.eye(len(learnt.components)))

@@ -14,7 +14,7 @@ from realizer.face.load import folder_of, load_face
 from realizer_studio.faces.parts import Part
 from realizer_studio.faces.person import fap_fields, lids, lips, skin_colours
 from realizer_studio.faces.person.bust import assemble
-from realizer_studio.faces.person.makehuman import BaseMesh, Ground
+from realizer_studio.faces.person.makehuman import BaseMesh, Figure
 from realizer_studio.faces.person.person import Person
 from realizer_studio.faces.person.recipe import Recipe
 from realizer_studio.faces.skin.atlas import corners
@@ -75,7 +75,7 @@ class Mask:
 
 
 @pytest.fixture(scope="session")
-def ground() -> Ground:
+def figure() -> Figure:
     """A mask whose feature points lie about where people's do, with the shapes that fields are made of."""
     mask, points = Mask(), {}
     x, y = np.arange(-13, 14) * STEP, np.arange(-44, 17) * STEP
@@ -103,7 +103,7 @@ def ground() -> Ground:
             points[name] = int(skin[np.argmin(off)])
     quads = {name: np.array(rows, np.int32) for name, rows in mask.quads.items()}
     mesh = BaseMesh(mask.at * 10, quads, *texture_of(mask.at, quads["body"]))
-    return Ground(mesh, mask.at, points, shape_of(mask.at))
+    return Figure(mesh, mask.at, points, shape_of(mask.at))
 
 
 def texture_of(at: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -138,24 +138,24 @@ def shape_of(at: np.ndarray) -> Callable[[str], np.ndarray]:
 
 
 @pytest.fixture(scope="session")
-def person(ground: Ground) -> Person:
+def person(figure: Figure) -> Person:
     """The mask as a person."""
     centres = (np.array([s * 0.031, 0, 0.005]) for s in (1, -1))
-    face = float(ground.point("11.1")[1] - ground.point("2.1")[1])
+    face = float(figure.point("11.1")[1] - figure.point("2.1")[1])
     balls = tuple((centre, 0.012) for centre in centres)
     jaw, head = np.array([0, -0.03, -0.05]), np.array([0, -0.08, -0.06])
-    return Person(ground, balls, face, jaw, head, floor=-0.25, arch=(0.02, 0.03))
+    return Person(figure, balls, face, jaw, head, floor=-0.25, arch=(0.02, 0.03))
 
 
 @pytest.fixture(scope="session")
-def mask_lips(ground: Ground) -> lips.Lips:
-    return lips.Lips(ground)
+def mask_lips(figure: Figure) -> lips.Lips:
+    return lips.Lips(figure)
 
 
 @pytest.fixture(scope="session")
-def mask_lids(ground: Ground) -> list[lids.Lid]:
+def mask_lids(figure: Figure) -> list[lids.Lid]:
     """The lids of the left and the right eye."""
-    return [lids.Lid(ground, side) for side in (1, -1)]
+    return [lids.Lid(figure, side) for side in (1, -1)]
 
 
 @pytest.fixture(scope="session")
@@ -182,11 +182,11 @@ def maps(
 
 
 @pytest.fixture(scope="session")
-def fields(ground: Ground, person: Person) -> dict[int, np.ndarray]:
+def fields(figure: Figure, person: Person) -> dict[int, np.ndarray]:
     """The fields of the mask as they are before triangles that turn over are mended."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fap_fields, "without_flips", lambda fields, *_: dict(fields))
-        return fap_fields.face_fields(ground, person.jaw_pivot)[0]
+        return fap_fields.face_fields(figure, person.jaw_pivot)[0]
 
 
 @pytest.fixture(scope="session")
@@ -196,6 +196,6 @@ def skin(
     """The skin of an old mask with freckles and stubble, on small maps."""
     part = parts[0]
     assert part.patch is not None
-    texels = Texels(part.vertices, part.triangles, corners(person.ground.mesh, part.patch), 256)
+    texels = Texels(part.vertices, part.triangles, corners(person.figure.mesh, part.patch), 256)
     old = Recipe("An old mask", {}, recipe.colours, {}, {"age": 0.8, "freckles": 1.0, "stubble": 0.8})
     return Skin(texels, part, person, mask_lips, mask_lids, old, seed=5)

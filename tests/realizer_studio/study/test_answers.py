@@ -23,7 +23,7 @@ def test_read_answers_says_what_pictures_were(tmp_path: Path) -> None:
         ("none", False, None),
         ("anger", True, 225.0),
     ]
-    assert {one.who for one in found} == {"people"}
+    assert {one.group for one in found} == {"people"}
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from realizer_studio.study.measures import against_chance, circular_mean, hit_rates, interval, ratio, turn
+from realizer_studio.study.measures import (
+    against_chance,
+    angle_difference,
+    circular_mean,
+    hit_rates,
+    interval,
+    ratio,
+)
 
 
 def test_hit_rates_do_not_reward_who_always_gives_one_name() -> None:
@@ -37,7 +44,12 @@ def test_interval_stays_within_limits() -> None:
 
 
 def test_turn_is_the_short_way() -> None:
-    assert [turn(350, 10), turn(10, 350), turn(180, 0), turn(90, 90)] == [-20, 20, -180, 0]
+    assert [
+        angle_difference(350, 10),
+        angle_difference(10, 350),
+        angle_difference(180, 0),
+        angle_difference(90, 90),
+    ] == [-20, 20, -180, 0]
 
 
 def test_circular_mean_goes_over_zero() -> None:

@@ -13,13 +13,13 @@ from bml_schema import parse
 from realizer.animation.fap.fap_reader import read_fap
 from realizer_studio.tracking.files import FORMATS, by_mapping, unit_columns
 from realizer_studio.tracking.recording import Recording
-from realizer_studio.tracking.regressor import SEEN_UNITS
+from realizer_studio.tracking.regressor import MEASURED_UNITS
 
 
 def recording() -> Recording:
     """A smile with a turn of the head to the left; nobody is seen in the last frame."""
-    units, faps = np.zeros((3, len(SEEN_UNITS))), np.zeros((3, 68))
-    units[:2, SEEN_UNITS.index("12L")] = 0.75
+    units, faps = np.zeros((3, len(MEASURED_UNITS))), np.zeros((3, 68))
+    units[:2, MEASURED_UNITS.index("12L")] = 0.75
     faps[:2, 11] = 240.4
     faps[:2, 48] = np.radians(30) / 1e-5
     return Recording(10.0, np.arange(3) / 10, units, faps, np.array([True, True, False]))

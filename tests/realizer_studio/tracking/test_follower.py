@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from realizer_studio.tracking import follower
-from realizer_studio.tracking.follower import Follower, Unfinished, follow
+from realizer_studio.tracking.follower import Follower, LandmarkCache, follow
 from realizer_studio.tracking.landmarks import Landmarks, landmarks
 from realizer_studio.tracking.pictures import Picture
 from tests.portraits import LITERT, portrait
@@ -87,10 +87,10 @@ def film(count: int, broken: int | None = None, looked: list[int] | None = None)
         yield Picture(k / 10, portrait("ada"), "film")
 
 
-def kept(tmp_path: Path) -> Unfinished:
+def kept(tmp_path: Path) -> LandmarkCache:
     if not (tmp_path / "film.mp4").exists():
         (tmp_path / "film.mp4").write_bytes(b"film")
-    made = Unfinished(tmp_path / "out.csv.part", tmp_path / "film.mp4")
+    made = LandmarkCache(tmp_path / "out.csv.part", tmp_path / "film.mp4")
     made.every = 2
     return made
 

@@ -9,7 +9,7 @@ from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.follower import Person
 from realizer_studio.tracking.landmarks import landmarks
 from realizer_studio.tracking.recording import Recording, rate_of, record
-from realizer_studio.tracking.regressor import SEEN_UNITS
+from realizer_studio.tracking.regressor import MEASURED_UNITS
 from tests.portraits import LITERT, faps_of, portrait
 
 pytestmark = [LITERT, pytest.mark.gl("onboard")]
@@ -27,7 +27,7 @@ def person(*strengths: float) -> Person:
 
 
 def smile(recording: Recording) -> np.ndarray:
-    return recording.units[:, SEEN_UNITS.index("12L")]
+    return recording.units[:, MEASURED_UNITS.index("12L")]
 
 
 def test_record_finds_rest_in_the_film_itself() -> None:
@@ -45,7 +45,7 @@ def test_record_fills_short_gaps_and_leaves_long_ones() -> None:
     nothing = float("nan")
     smiling = person(0, 0, 0, 1, nothing, 1, 1, *[nothing] * 15, 1, 1)
     recording = record(smiling, np.arange(24) / 10, 10)
-    assert recording.seen.tolist() == [True] * 7 + [False] * 15 + [True] * 2
+    assert recording.visible.tolist() == [True] * 7 + [False] * 15 + [True] * 2
     assert smile(recording)[4] > 0.5
     assert not recording.faps[10].any()
 
@@ -56,7 +56,7 @@ def test_record_takes_times_of_a_variable_rate() -> None:
     assert recording.times == pytest.approx(np.arange(11) / 10)
     assert smile(recording)[1] < 0.2
     assert smile(recording)[9] > 0.5  # between 0.7 and 1.0
-    assert recording.seen.all()
+    assert recording.visible.all()
 
 
 def test_rate_is_that_of_most_pictures() -> None:

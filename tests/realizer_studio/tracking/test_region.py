@@ -23,7 +23,7 @@ def test_region_places_what_it_cuts(side: float, angle: float, mirrored: bool) -
     region = Region(140, 90, side, angle, mirrored)
     seen = np.asarray(region.cut(spot(150, 80), 64)).sum(axis=2)
     y, x = (np.mgrid[:64, :64] * seen).sum(axis=(1, 2)) / seen.sum()
-    (place,) = region.place([[(x + 0.5) / 64, (y + 0.5) / 64]])
+    (place,) = region.to_picture([[(x + 0.5) / 64, (y + 0.5) / 64]])
     assert place == pytest.approx((150.5, 80.5), abs=side / 64)
 
 

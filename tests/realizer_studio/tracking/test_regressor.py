@@ -10,7 +10,7 @@ from realizer_studio.analysis.faps_from_points import head_angles
 from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.landmarks import Landmarks, landmarks
 from realizer_studio.tracking.regressor import (
-    SEEN_UNITS,
+    MEASURED_UNITS,
     UP,
     Measured,
     components,
@@ -48,7 +48,7 @@ def measured(faps: np.ndarray, with_neutral: bool = True) -> Measured:
 @pytest.mark.parametrize("unit", ["4", "12", "15", "26", "43"])
 def test_units_that_a_picture_shows_are_measured(unit: str, with_neutral: bool) -> None:
     found = measured(faps_of("ida", **{f"AU{unit}": 0.9}), with_neutral)
-    values = dict(zip(SEEN_UNITS, found.units[0], strict=True))
+    values = dict(zip(MEASURED_UNITS, found.units[0], strict=True))
     shown = [value for name, value in values.items() if name.rstrip("LR") == unit]
     assert min(shown) > 0.35
     assert all(0 <= value <= 1 for value in values.values())
@@ -63,7 +63,7 @@ def test_units_of_one_side_are_told_apart() -> None:
     faps = faps_of("ida", AU12=0.9)
     right = [13, 7, 60, 54, 9, 11, 56, 58, 42]
     faps[[fap - 1 for fap in right]] = 0
-    values = dict(zip(SEEN_UNITS, measured(faps).units[0], strict=True))
+    values = dict(zip(MEASURED_UNITS, measured(faps).units[0], strict=True))
     assert values["12L"] > values["12R"] + 0.1
 
 

@@ -26,18 +26,18 @@ def test_read_head_sorts_vertices_part_after_part(ada_glb: Path) -> None:
 def test_fap_sources_tell_shapes_from_zones_and_guesses() -> None:
     sources = {one.fap: one for one in fap_sources({6, 31}, {"4.1", "9.1"}, {"skin"}, False)}
     assert list(sources) == list(range(3, 69))
-    assert (sources[6].made_by, sources[6].sure) == ("mouthSmileLeft mouthStretchLeft", SURE)
-    assert sources[31].sure == FAIR  # 4.1 is a guess
-    assert sources[7].made_by.startswith("a zone around its point (its shapes mouthSmileRight")
-    assert {sources[fap].sure for fap in (61, 62)} == {GUESS, FAIR}
-    assert sources[43].made_by == "nothing: there is no tongue"
-    assert sources[23].made_by == "a turn or push of the eyeball"
+    assert (sources[6].source, sources[6].certainty) == ("mouthSmileLeft mouthStretchLeft", SURE)
+    assert sources[31].certainty == FAIR  # 4.1 is a guess
+    assert sources[7].source.startswith("a zone around its point (its shapes mouthSmileRight")
+    assert {sources[fap].certainty for fap in (61, 62)} == {GUESS, FAIR}
+    assert sources[43].source == "nothing: there is no tongue"
+    assert sources[23].source == "a turn or push of the eyeball"
 
 
 def test_fap_sources_of_painted_eyes_are_shapes() -> None:
     sources = {one.fap: one for one in fap_sources((), (), ("tongue",), True)}
-    assert sources[23].made_by == "eyeLook shapes"
-    assert sources[27].sure == FAIR
+    assert sources[23].source == "eyeLook shapes"
+    assert sources[27].certainty == FAIR
 
 
 def test_source_table_puts_equal_sources_together() -> None:
@@ -50,4 +50,4 @@ def test_source_table_puts_equal_sources_together() -> None:
 def test_fap_sources_name_shapes_of_arkit() -> None:
     served = {3, *range(4, 23), *range(31, 37), *range(39, 43), *range(51, 61)}
     made = [one for one in fap_sources(served, (), (), False) if one.fap in served]
-    assert {name for one in made for name in one.made_by.split()} <= shapes().keys()
+    assert {name for one in made for name in one.source.split()} <= shapes().keys()

@@ -45,12 +45,12 @@ def test_mouth_outer_runs_from_the_inner_to_the_outer_contour(mouth: Mouth) -> N
 
 def test_mouth_away_counts_metres_over_the_skin(mouth: Mouth) -> None:
     vertex = int(np.argmin(np.linalg.norm(AT - [0, 0.026, 0], axis=1)))
-    assert mouth.away[vertex] == pytest.approx(0.016, rel=0.05)
-    assert mouth.away[np.argmin(np.linalg.norm(AT - [0, 0.01, 0], axis=1))] == 0
+    assert mouth.distance[vertex] == pytest.approx(0.016, rel=0.05)
+    assert mouth.distance[np.argmin(np.linalg.norm(AT - [0, 0.01, 0], axis=1))] == 0
 
 
 def test_mouth_upper_is_sharp_at_the_lips_and_soft_beside_them(mouth: Mouth) -> None:
-    near = mouth.away < 0.004
+    near = mouth.distance < 0.004
     assert set(np.unique(mouth.upper[near])) == {0.0, 1.0}
     assert (mouth.upper[near] == (AT[near, 1] > 0)).all()
     beside = mouth.upper[(np.abs(AT[:, 0]) > 0.036) & (AT[:, 1] == 0)]

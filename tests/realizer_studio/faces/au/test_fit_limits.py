@@ -15,7 +15,7 @@ from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer_studio.faces.au.fit import fit_models
-from realizer_studio.faces.au.fit_limits import FURTHEST, overshoot, runaways, watched_places
+from realizer_studio.faces.au.fit_limits import FURTHEST, monitored_points, overshoot, runaways
 from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
 
 pytestmark = pytest.mark.xdist_group("fits")
@@ -90,14 +90,14 @@ def test_overshoot_costs_only_what_is_too_far() -> None:
             assert (more - miss)[0] / 1e-6 == pytest.approx(slopes[0, column], abs=1e-3)
 
 
-def test_watched_places_are_each_vertex_once_on_the_left(face: Face) -> None:
+def test_monitored_points_are_each_vertex_once_on_the_left(face: Face) -> None:
     model = read_model(FOLDER / "au_published.toml")
-    places = watched_places(face, model.mouth)
+    places = monitored_points(face, model.mouth)
     assert (places.at[:, 0] >= 0).all()
     assert 1000 < len(places.at) < len(face.vertices)
     corner = np.linalg.norm(places.at - face.points["8.3"], axis=1)
     assert corner.min() < 1e-6
-    finer = watched_places(face, model.mouth, between=True)
+    finer = monitored_points(face, model.mouth, between=True)
     assert len(finer.at) > 3 * len(places.at)
     assert {tuple(at) for at in places.at.tolist()} <= {tuple(at) for at in finer.at.tolist()}
     # Every place belongs to a half, or in part to both.

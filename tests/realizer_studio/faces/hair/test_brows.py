@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer_studio.faces.hair.brows import Brow, brow, seen_from_front, tint_of
+from realizer_studio.faces.hair.brows import Brow, brow, project_to_front, tint_of
 from realizer_studio.faces.person.recipe import appearance_of
 
 Skin = tuple[np.ndarray, np.ndarray]
@@ -11,7 +11,7 @@ Skin = tuple[np.ndarray, np.ndarray]
 
 def brow_places(skin: Skin, points: dict[str, np.ndarray], side: int = 1, **look: float) -> np.ndarray:
     rng = np.random.default_rng(3)
-    return brow(skin, skin, points, side, [60, 40, 30], appearance_of(look), rng).places
+    return brow(skin, skin, points, side, [60, 40, 30], appearance_of(look), rng).positions
 
 
 def test_brow_lies_on_the_skin_above_the_eye(skin: Skin, points: dict[str, np.ndarray]) -> None:
@@ -46,22 +46,22 @@ AT = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1.0
 TRIANGLES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
-def test_seen_from_front_takes_the_foremost_triangle() -> None:
-    corners, shares = seen_from_front(AT, TRIANGLES, np.array([[0.0025, 0.005]]))
+def test_project_to_front_takes_the_foremost_triangle() -> None:
+    corners, shares = project_to_front(AT, TRIANGLES, np.array([[0.0025, 0.005]]))
     assert corners.tolist() == [[3, 4, 5]]
     assert shares == pytest.approx(np.array([[0.25, 0.25, 0.5]]))
 
 
-def test_seen_from_front_continues_a_triangle_beyond_its_sides() -> None:
+def test_project_to_front_continues_a_triangle_beyond_its_sides() -> None:
     place = np.array([[-0.001, 0.002]])
-    corners, shares = seen_from_front(AT, TRIANGLES, place)
+    corners, shares = project_to_front(AT, TRIANGLES, place)
     assert (AT[corners] * shares[..., None]).sum(axis=1)[:, :2] == pytest.approx(place)
 
 
 def test_brow_goes_with_the_skin_that_each_piece_lies_on(skin: Skin, points: dict[str, np.ndarray]) -> None:
     patch = brow(skin, skin, points, 1, [60, 40, 30], appearance_of({}), np.random.default_rng(3))
     below = (skin[0][patch.skin] * patch.shares[..., None]).sum(axis=1)
-    assert below[:, :2] == pytest.approx(patch.places[:, :2], abs=1e-9)
+    assert below[:, :2] == pytest.approx(patch.positions[:, :2], abs=1e-9)
 
 
 @pytest.mark.parametrize("side", [1, -1])

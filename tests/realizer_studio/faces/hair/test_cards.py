@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from realizer.face.mesh_geometry import vertex_normals
-from realizer_studio.faces.hair.cards import STRIPS, Patch, hair_texture, joined, place, ribbons
+from realizer_studio.faces.hair.cards import STRIPS, Patch, hair_texture, joined, ribbons, strip_uv
 from realizer_studio.faces.skin.atlas import HAIR
 
 
@@ -20,29 +20,29 @@ def patch() -> Patch:
 
 
 def test_ribbons_are_as_wide_as_asked(patch: Patch) -> None:
-    wide = np.abs(np.diff(patch.places[:, 0].reshape(-1, 2), axis=1))[:, 0]
+    wide = np.abs(np.diff(patch.positions[:, 0].reshape(-1, 2), axis=1))[:, 0]
     assert wide == pytest.approx([0.004] * 5 + [0.001])
 
 
 def test_ribbons_face_the_way_of_their_normals(patch: Patch) -> None:
-    assert (vertex_normals(patch.places, patch.triangles)[:, 2] > 0.99).all()
-    assert (patch.ups[:, 2] > 0.7).all()
+    assert (vertex_normals(patch.positions, patch.triangles)[:, 2] > 0.99).all()
+    assert (patch.normals[:, 2] > 0.7).all()
 
 
 def test_ribbons_keep_hairs_straight_where_they_narrow(patch: Patch) -> None:
-    u, x = patch.uv[6:, 0].reshape(-1, 2), patch.places[6:, 0].reshape(-1, 2)
+    u, x = patch.uv[6:, 0].reshape(-1, 2), patch.positions[6:, 0].reshape(-1, 2)
     assert np.diff(u)[:, 0] / np.diff(x)[:, 0] == pytest.approx(np.diff(u)[0, 0] / np.diff(x)[0, 0])
 
 
 def test_joined_counts_triangles_on(patch: Patch) -> None:
     both = joined([patch, patch])
-    count = len(patch.places)
-    assert len(both.places) == 2 * count
+    count = len(patch.positions)
+    assert len(both.positions) == 2 * count
     assert (both.triangles[len(patch.triangles) :] == patch.triangles + count).all()
 
 
 def test_place_lies_in_its_strip_of_the_corner() -> None:
-    (u, v), (right, bottom) = place("brow", np.array([0.0, 1.0]), np.array([0.0, 1.0]))
+    (u, v), (right, bottom) = strip_uv("brow", np.array([0.0, 1.0]), np.array([0.0, 1.0]))
     strip = STRIPS["brow"]
     assert (right - u, HAIR.right - u) == pytest.approx(
         ((strip.right - strip.left) * 0.125, (1 - strip.left) * 0.125)

@@ -97,7 +97,7 @@ def bound(head: Face, patch: Patch, scalp: Scalp) -> Cards:
 
 def test_bind_finds_every_place_again_at_rest(head: Face, patch: Patch, scalp: Scalp) -> None:
     cards = bound(head, patch, scalp)
-    assert followed(cards, head.vertices.astype(float)) == pytest.approx(patch.places, abs=1e-6)
+    assert followed(cards, head.vertices.astype(float)) == pytest.approx(patch.positions, abs=1e-6)
     assert cards.weights.sum(axis=1) == pytest.approx(np.ones(3), abs=1e-6)
 
 
@@ -106,7 +106,7 @@ def test_bind_turns_hair_with_the_head(head: Face, patch: Patch, scalp: Scalp) -
     turn = np.array([[0, 0, 1.0], [0, 1, 0], [-1, 0, 0]])  # a quarter to the left
     share = head.basis["head"][:, :1]
     moved = followed(bound(head, patch, scalp), at + share * ((at - pivot) @ (turn - np.eye(3)).T))
-    whole = (patch.places - pivot) @ turn.T + pivot
+    whole = (patch.positions - pivot) @ turn.T + pivot
     assert moved[[0, 2]] == pytest.approx(whole[[0, 2]], abs=1e-5)
     assert np.linalg.norm(moved[1] - whole[1]) > 0.001  # hangs between head and bust
 

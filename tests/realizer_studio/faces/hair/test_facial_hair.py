@@ -22,7 +22,7 @@ def test_beard_grows_where_it_may_and_hangs_down(
     patch = beard(
         skin, scalp, where, points, amount, np.full((BEARD_CARDS, 3), 60.0), np.random.default_rng(5)
     )
-    lines = patch.places.reshape(BEARD_CARDS, -1, 3)
+    lines = patch.positions.reshape(BEARD_CARDS, -1, 3)
     assert where[patch.skin].mean(axis=1).min() > 0.3
     assert np.median(scalp.distance(lines[:, 0])) < 0.004
     way = lines[:, -2:].mean(axis=1) - lines[:, :2].mean(axis=1)
@@ -37,7 +37,7 @@ def lash_patch(head: Face, margin: Margin, at: np.ndarray | None = None) -> Patc
 
 def test_lashes_point_outwards_and_up_or_down(head: Face, margin: Margin) -> None:
     for upper in (True, False):
-        places = lash_patch(head, replace(margin, upper=upper)).places
+        places = lash_patch(head, replace(margin, upper=upper)).positions
         lines = places.reshape(-1, 4, 2, 3).mean(axis=2)
         way = (lines[:, -1] - lines[:, 0]).mean(axis=0)
         assert way[2] > 0

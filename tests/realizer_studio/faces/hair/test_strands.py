@@ -36,7 +36,7 @@ def test_flow_leads_away_from_the_parting_or_back_to_it(scalp: Scalp) -> None:
 
 def test_grow_keeps_short_hair_on_the_skull(scalp: Scalp, style: Style) -> None:
     strands = grown(scalp, style)
-    at = strands.places[strands.length > 0].reshape(-1, 3)
+    at = strands.positions[strands.length > 0].reshape(-1, 3)
     lift = scalp.lift(at)[0]
     assert lift.min() > -0.004
     assert (lift < 1.3 * thickness(scalp, style, at) + 0.003).mean() > 0.95
@@ -46,14 +46,14 @@ def test_grow_keeps_short_hair_on_the_skull(scalp: Scalp, style: Style) -> None:
 def test_grow_hangs_hair_beside_the_face(scalp: Scalp, name: str) -> None:
     style = style_of({"style": name})
     strands = grown(scalp, style)
-    at = strands.places[strands.length > 0].reshape(-1, 3)
+    at = strands.positions[strands.length > 0].reshape(-1, 3)
     assert at[:, 1].min() < -0.06
     before = at[(at[:, 2] > 0.02) & (at[:, 1] < 0.03)]
     assert not len(before) or np.abs(before[:, 0]).min() > 0.045
 
 
 def test_grow_ends_bobs_above_long_hair(scalp: Scalp) -> None:
-    low = {name: grown(scalp, style_of({"style": name})).places[..., 1].min() for name in ("bob", "long")}
+    low = {name: grown(scalp, style_of({"style": name})).positions[..., 1].min() for name in ("bob", "long")}
     assert low["bob"] > low["long"] + 0.05
 
 

@@ -56,7 +56,7 @@ def test_write_face_writes_maps_and_a_white_skin(written: Face, parts: list[Part
 
 def test_write_face_puts_feature_points_on_their_vertices(written: Face, person: Person) -> None:
     for name in ("2.1", "2.2", "8.3", "3.1"):
-        assert written.points[name] == pytest.approx(person.ground.point(name), abs=1e-5)
+        assert written.points[name] == pytest.approx(person.figure.point(name), abs=1e-5)
         assert written.vertices[written.feature_points[name]] == pytest.approx(written.points[name], abs=1e-5)
     assert written.points["7.1"] == pytest.approx(person.head_pivot)
     assert written.points["9.8"][1] > written.points["9.10"][1]

@@ -7,7 +7,7 @@ import pytest
 
 from realizer_studio.faces.parts import Part
 from realizer_studio.faces.person.bust import ORDER
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 
 pytestmark = pytest.mark.xdist_group("mask")
 
@@ -35,17 +35,17 @@ def test_assemble_cuts_the_skin_under_the_shirt(parts: list[Part]) -> None:
     assert lowest["shirt"] < lowest["skin"]
 
 
-def test_assemble_keeps_the_feature_points_on_the_skin(ground: Ground, parts: list[Part]) -> None:
+def test_assemble_keeps_the_feature_points_on_the_skin(figure: Figure, parts: list[Part]) -> None:
     skin = parts[0]
     for name in ("2.1", "2.2", "2.3", "8.3", "3.1", "4.3", "9.3"):
-        off = np.linalg.norm(skin.vertices - ground.point(name), axis=1)
+        off = np.linalg.norm(skin.vertices - figure.point(name), axis=1)
         assert off.min() < 1e-9, name
 
 
-def test_assemble_puts_teeth_behind_the_lips(ground: Ground, parts: list[Part]) -> None:
+def test_assemble_puts_teeth_behind_the_lips(figure: Figure, parts: list[Part]) -> None:
     for part in parts:
         if part.name.endswith("teeth"):
-            assert part.vertices[:, 2].max() < ground.point("2.2")[2]
+            assert part.vertices[:, 2].max() < figure.point("2.2")[2]
 
 
 def test_assemble_puts_the_lower_teeth_inside_the_upper_ones(parts: list[Part]) -> None:

@@ -10,22 +10,22 @@ from realizer.face.load import load_face
 from realizer.tables import faps
 from realizer_studio.faces.mpeg4.fap_measures import Measure, flips_of
 from realizer_studio.faces.mpeg4.fields import DIRECTIONS
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 from tests.shipped import FACES
 
 pytestmark = pytest.mark.xdist_group("mask")
 Fields = dict[int, np.ndarray]
 
 
-def test_far_fields_move_each_feature_point_by_one(ground: Ground, fields: Fields) -> None:
+def test_far_fields_move_each_feature_point_by_one(figure: Figure, fields: Fields) -> None:
     for fap in LIMITS:
         row = faps()[fap - 1]
-        move = fields[BEYOND + fap][ground.points[row.feature_point]]
+        move = fields[BEYOND + fap][figure.points[row.feature_point]]
         assert move @ np.array(DIRECTIONS[row.direction]) == pytest.approx(1), row.name
 
 
-def test_far_fields_of_two_sides_mirror(ground: Ground, fields: Fields) -> None:
-    twin = ground.mesh.mirror()
+def test_far_fields_of_two_sides_mirror(figure: Figure, fields: Fields) -> None:
+    twin = figure.mesh.mirror()
     for fap in LIMITS:
         row = faps()[fap - 1]
         mirrored = row.sign * fields[BEYOND + row.mirror][twin] * [-1, 1, 1]

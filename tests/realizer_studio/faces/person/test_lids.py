@@ -10,65 +10,65 @@ from realizer.face.drawn_mesh import WET, drawn_mesh
 from realizer.face.load import load_face
 from realizer.face.mesh_geometry import part_triangles, vertex_normals
 from realizer_studio.faces.person.lids import Lid, lid_fields
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 from tests.shipped import FACES
 
 pytestmark = pytest.mark.xdist_group("mask")
 
 
-def test_lid_rings_are_mirror_images(ground: Ground, mask_lids: list[Lid]) -> None:
+def test_lid_rings_are_mirror_images(figure: Figure, mask_lids: list[Lid]) -> None:
     left, right = mask_lids
     for one, other in zip(left.rings, right.rings, strict=True):
-        assert ground.at[one] == pytest.approx(ground.at[other] * [-1, 1, 1])
+        assert figure.at[one] == pytest.approx(figure.at[other] * [-1, 1, 1])
 
 
-def test_lid_edges_run_from_the_inner_to_the_outer_corner(ground: Ground, mask_lids: list[Lid]) -> None:
+def test_lid_edges_run_from_the_inner_to_the_outer_corner(figure: Figure, mask_lids: list[Lid]) -> None:
     for lid in mask_lids:
         for edge in (lid.upper, lid.lower):
             assert (edge[0], edge[-1]) == (lid.inner, lid.outer)
-            assert (np.diff(np.abs(ground.at[edge, 0])) > 0).all()
+            assert (np.diff(np.abs(figure.at[edge, 0])) > 0).all()
         assert set(lid.upper) | set(lid.lower) == set(lid.rings[0])
-        assert ground.at[lid.upper, 1].mean() > ground.at[lid.lower, 1].mean()
+        assert figure.at[lid.upper, 1].mean() > figure.at[lid.lower, 1].mean()
 
 
 def test_lid_gap_is_widest_between_the_corners_and_nothing_beyond(
-    ground: Ground, mask_lids: list[Lid]
+    figure: Figure, mask_lids: list[Lid]
 ) -> None:
     for lid in mask_lids:
-        inner, outer = ground.at[[lid.inner, lid.outer], 0]
+        inner, outer = figure.at[[lid.inner, lid.outer], 0]
         x = np.linspace(inner, outer, 21)
         gap = lid.gap(x)
         assert gap[[0, -1]] == pytest.approx(0, abs=1e-9)
         assert gap.max() == pytest.approx(lid.aperture, rel=0.05)
         assert not lid.gap(np.array([inner - lid.side * 0.001, outer + lid.side * 0.001])).any()
-        assert lid.gap_of(ground.at, upper=True).max() == pytest.approx(lid.aperture, rel=0.05)
+        assert lid.gap_of(figure.at, upper=True).max() == pytest.approx(lid.aperture, rel=0.05)
         assert lid.middle(np.array([(inner + outer) / 2])) == pytest.approx(0, abs=0.001)
 
 
-def test_lid_fields_move_the_edge_s_middle_by_one(ground: Ground) -> None:
-    made = lid_fields(ground)
+def test_lid_fields_move_the_edge_s_middle_by_one(figure: Figure) -> None:
+    made = lid_fields(figure)
     assert set(made) == {19, 20, 21, 22, 27, 28}
     for fap, point, way in ((19, "3.1", -1), (20, "3.2", -1), (21, "3.3", 1), (22, "3.4", 1)):
-        assert made[fap][ground.points[point]] == pytest.approx([0, way, 0])
+        assert made[fap][figure.points[point]] == pytest.approx([0, way, 0])
 
 
-def test_lid_fields_of_both_lids_close_the_whole_opening(ground: Ground, mask_lids: list[Lid]) -> None:
-    made, lid = lid_fields(ground), mask_lids[0]
-    shut = ground.at + 0.5 * lid.aperture * (made[19] + made[21])
+def test_lid_fields_of_both_lids_close_the_whole_opening(figure: Figure, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(figure), mask_lids[0]
+    shut = figure.at + 0.5 * lid.aperture * (made[19] + made[21])
     upper, lower = (shut[edge] for edge in (lid.upper, lid.lower))
     below = np.interp(upper[:, 0], lower[:, 0], lower[:, 1])
     assert upper[:, 1] - below == pytest.approx(np.zeros(len(upper)), abs=0.15 * lid.aperture)
 
 
-def test_lid_fields_leave_the_other_side_and_the_mouth(ground: Ground) -> None:
-    made = lid_fields(ground)
-    assert not made[19][ground.at[:, 0] < -0.001].any()
-    assert not made[21][ground.at[:, 1] < -0.05].any()
+def test_lid_fields_leave_the_other_side_and_the_mouth(figure: Figure) -> None:
+    made = lid_fields(figure)
+    assert not made[19][figure.at[:, 0] < -0.001].any()
+    assert not made[21][figure.at[:, 1] < -0.05].any()
 
 
-def test_lid_fields_move_what_lies_behind_their_own_edge(ground: Ground, mask_lids: list[Lid]) -> None:
-    made, lid = lid_fields(ground), mask_lids[0]
-    leader, _ = lid.followers(ground)
+def test_lid_fields_move_what_lies_behind_their_own_edge(figure: Figure, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(figure), mask_lids[0]
+    leader, _ = lid.followers(figure)
     for fap, mine, other in ((19, lid.upper, lid.lower), (21, lid.lower, lid.upper)):
         moved = np.linalg.norm(made[fap], axis=1)
         for ring in lid.rings[1:4]:
@@ -76,9 +76,9 @@ def test_lid_fields_move_what_lies_behind_their_own_edge(ground: Ground, mask_li
             assert moved[own].min() > 4 * moved[theirs].max()
 
 
-def test_lid_fields_move_the_corners_with_the_edge_too(ground: Ground, mask_lids: list[Lid]) -> None:
-    made, lid = lid_fields(ground), mask_lids[0]
-    leader, _ = lid.followers(ground)
+def test_lid_fields_move_the_corners_with_the_edge_too(figure: Figure, mask_lids: list[Lid]) -> None:
+    made, lid = lid_fields(figure), mask_lids[0]
+    leader, _ = lid.followers(figure)
     for fap, edge in ((19, lid.upper), (21, lid.lower)):
         moved = np.linalg.norm(made[fap], axis=1)
         share = [moved[v] / moved[leader[v]] for v in lid.rings[2] if leader[v] in edge[1:-1]]

@@ -10,7 +10,7 @@ import pytest
 from realizer_studio.faces.eyeball import CORNEA, cornea
 from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.lips import BORDER, LOWER_MIDDLE, Lips
-from realizer_studio.faces.person.makehuman import BaseMesh, Ground
+from realizer_studio.faces.person.makehuman import BaseMesh, Figure
 from realizer_studio.faces.person.person import (
     CLEAR,
     INSET,
@@ -63,48 +63,48 @@ def test_identity_is_even_whatever_the_targets(mesh: BaseMesh, data: Path) -> No
     assert at[mesh.mirror()] == pytest.approx(at * [-1, 1, 1])
 
 
-def test_relaxed_rounds_the_lower_lip_and_keeps_its_size(ground: Ground, mask_lips: Lips) -> None:
+def test_relaxed_rounds_the_lower_lip_and_keeps_its_size(figure: Figure, mask_lips: Lips) -> None:
     ring = mask_lips.rings[BORDER]
-    bent, middle = ground.at.copy(), ring[LOWER_MIDDLE]
+    bent, middle = figure.at.copy(), ring[LOWER_MIDDLE]
     bent[middle, 1] -= 0.002
-    made = _relaxed(Ground(ground.mesh, bent, ground.points, ground.shape))
-    assert abs(made[middle, 1] - ground.at[middle, 1]) < 0.001
-    assert np.ptp(made[ring], axis=0)[:2] == pytest.approx(np.ptp(ground.at[ring], axis=0)[:2], rel=0.1)
+    made = _relaxed(Figure(figure.mesh, bent, figure.points, figure.shape))
+    assert abs(made[middle, 1] - figure.at[middle, 1]) < 0.001
+    assert np.ptp(made[ring], axis=0)[:2] == pytest.approx(np.ptp(figure.at[ring], axis=0)[:2], rel=0.1)
 
 
 def test_person_turns_whole_above_the_jaw_and_not_below_the_neck(person: Person) -> None:
-    turns, at = person.turns(), person.ground.at
-    assert (turns[person.ground.body & (at[:, 1] > -0.05)] == 1).all()
+    turns, at = person.turns(), person.figure.at
+    assert (turns[person.figure.body & (at[:, 1] > -0.05)] == 1).all()
     assert (turns[at[:, 1] < -0.24] < 0.1).all()
-    middle = np.flatnonzero(person.ground.body & (at[:, 0] == 0) & (at[:, 1] < -0.05))
+    middle = np.flatnonzero(person.figure.body & (at[:, 0] == 0) & (at[:, 1] < -0.05))
     order = np.argsort((at[:, 1] + 0.3 * at[:, 2])[middle])
     assert (np.diff(turns[middle[order]]) >= 0).all()
 
 
-def test_landmarks_on_the_tongue_are_its_tip_its_top_and_its_sides(ground: Ground) -> None:
-    at = ground.at.copy()
-    tongue = np.unique(ground.mesh.quads["helper-tongue"])
+def test_landmarks_on_the_tongue_are_its_tip_its_top_and_its_sides(figure: Figure) -> None:
+    at = figure.at.copy()
+    tongue = np.unique(figure.mesh.quads["helper-tongue"])
     at[tongue, 1] -= 0.2 * np.abs(at[tongue, 0])
-    found = _landmarks(ground.mesh, at)
+    found = _landmarks(figure.mesh, at)
     for name in ("6.1", "6.2", "6.3", "6.4"):
-        assert found[name] == ground.points[name], name
+        assert found[name] == figure.points[name], name
 
 
 @pytest.fixture(scope="module")
-def with_sockets(ground: Ground) -> Ground:
+def with_sockets(figure: Figure) -> Figure:
     """The mask with a ball of 12 mm behind each eye, too high by 4 mm."""
     ways = np.random.default_rng(1).normal(size=(40, 3))
     ball = 0.012 * ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    at = np.concatenate([ground.at, *(ball + np.array([side * 0.031, 0.004, 0.02]) for side in (1, -1))])
-    first = len(ground.at)
+    at = np.concatenate([figure.at, *(ball + np.array([side * 0.031, 0.004, 0.02]) for side in (1, -1))])
+    first = len(figure.at)
     quads = {
         f"helper-{side}-eye": first + 40 * k + np.arange(40).reshape(-1, 4) for k, side in enumerate("lr")
     }
-    mesh = BaseMesh(at, {**ground.mesh.quads, **quads}, ground.mesh.texture, ground.mesh.corners)
-    return Ground(mesh, at, ground.points, ground.shape)
+    mesh = BaseMesh(at, {**figure.mesh.quads, **quads}, figure.mesh.texture, figure.mesh.corners)
+    return Figure(mesh, at, figure.points, figure.shape)
 
 
-def test_balls_stand_before_the_middle_of_the_lids(with_sockets: Ground) -> None:
+def test_balls_stand_before_the_middle_of_the_lids(with_sockets: Figure) -> None:
     for (centre, radius), upper, lower in zip(
         balls(with_sockets), ("3.1", "3.2"), ("3.3", "3.4"), strict=True
     ):
@@ -114,12 +114,12 @@ def test_balls_stand_before_the_middle_of_the_lids(with_sockets: Ground) -> None
         assert radius == pytest.approx(0.012 - INSET)
 
 
-def test_cleared_lids_are_in_front_of_balls_and_corneas(ground: Ground) -> None:
+def test_cleared_lids_are_in_front_of_balls_and_corneas(figure: Figure) -> None:
     eyes = tuple((np.array([side * 0.031, 0, 0.015]), 0.012) for side in (1, -1))
-    at = cleared(ground, (eyes[0], eyes[1]))
-    assert (at[:, :2] == ground.at[:, :2]).all()
+    at = cleared(figure, (eyes[0], eyes[1]))
+    assert (at[:, :2] == figure.at[:, :2]).all()
     for side, (centre, radius) in zip((1, -1), eyes, strict=True):
-        for ring, room in zip(Lid(ground, side).rings, CLEAR, strict=False):
+        for ring, room in zip(Lid(figure, side).rings, CLEAR, strict=False):
             before = centre + np.array([0, 0, cornea(radius)[0]])
             assert np.linalg.norm(at[ring] - centre, axis=1).min() > radius + room - 1e-9
             assert np.linalg.norm(at[ring] - before, axis=1).min() > CORNEA + room - 1e-9

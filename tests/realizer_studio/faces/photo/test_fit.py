@@ -10,8 +10,8 @@ from PIL import Image, ImageDraw
 
 from realizer.core.errors import FaceError
 from realizer_studio.faces.eyeball import LIMBUS
-from realizer_studio.faces.photo.fit import IRIS, SEEN, fit_person, outline
-from realizer_studio.faces.photo.shape import DISTANCE, Places, Pose, Sliders
+from realizer_studio.faces.photo.fit import IRIS, VISIBLE_IRIS, fit_person, outline
+from realizer_studio.faces.photo.shape import DISTANCE, LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.views import View
 from realizer_studio.tracking.region import Region
 
@@ -19,14 +19,14 @@ SCALE = 3000.0  # pixels a metre
 
 
 def view(points: np.ndarray | None, turn: float, image: Image.Image | None = None) -> View:
-    iris = SEEN * 2 * LIMBUS * SCALE * DISTANCE / (DISTANCE - IRIS)
+    iris = VISIBLE_IRIS * 2 * LIMBUS * SCALE * DISTANCE / (DISTANCE - IRIS)
     shown = image or Image.new("RGB", (1000, 1000))
     return View(shown, points, Region(500, 500, 600), turn, np.zeros((2, 2)), iris)
 
 
 def person(data: Path) -> tuple[dict[str, float], np.ndarray]:
     """Return sliders of somebody, and the mesh."""
-    places = Places.of("front"), Places.of("side")
+    places = LandmarkAnchors.of("front"), LandmarkAnchors.of("side")
     sliders = Sliders(data, {}, np.concatenate([part.corners for part in places]))
     told = sliders.person(np.zeros(len(sliders.names))) | {"nose_width": 0.4, "jaw": -0.3}
     return told, sliders.mesh(told)
@@ -34,9 +34,9 @@ def person(data: Path) -> tuple[dict[str, float], np.ndarray]:
 
 def seen(at: np.ndarray, view: str, pose: Pose) -> np.ndarray:
     """Return the pixels (468, 2) of the landmarks; those that the view does not have are far off."""
-    places = Places.of(view)
+    places = LandmarkAnchors.of(view)
     points = np.full((468, 2), 1e4)
-    points[places.numbers] = pose(places.on(at))[0]
+    points[places.numbers] = pose(places.positions(at))[0]
     return points
 
 
@@ -60,9 +60,9 @@ def test_fit_finds_poses_and_places_again(data: Path) -> None:
 
 def drawn(at: np.ndarray) -> Image.Image:
     """Return a picture of a head in profile: what lies behind the middle line of its face."""
-    places = Places.of("front")
-    flat, _ = Pose(np.array([0, np.pi / 2, 0]), SCALE, np.array([600.0, 450.0]))(places.on(at))
-    line = flat[np.abs(places.on(at)[:, 0]) < 0.0015]
+    places = LandmarkAnchors.of("front")
+    flat, _ = Pose(np.array([0, np.pi / 2, 0]), SCALE, np.array([600.0, 450.0]))(places.positions(at))
+    line = flat[np.abs(places.positions(at)[:, 0]) < 0.0015]
     line = line[np.argsort(line[:, 1])]
     image = Image.new("RGB", (1000, 1000), (90, 100, 110))
     corners = [(300, 0), (line[0, 0], 0), *map(tuple, line), (line[-1, 0] - 60, 1000), (300, 1000)]

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from realizer_studio.faces.person.sliders import person_faults
-from realizer_studio.faces.photo.shape import DISTANCE, Places, Pose, Sliders
+from realizer_studio.faces.photo.shape import DISTANCE, LandmarkAnchors, Pose, Sliders
 
 
 def test_places_are_shares_of_three_vertices() -> None:
-    front, side = Places.of("front"), Places.of("side")
+    front, side = LandmarkAnchors.of("front"), LandmarkAnchors.of("side")
     assert front.numbers.tolist() == list(range(468))
     assert 200 < len(side.numbers) < 468
     for places in (front, side):
         assert places.shares.sum(axis=1) == pytest.approx(1)
         assert places.shares.min() > -0.01
-    assert front.some(front.numbers == 7).corners.tolist() == [front.corners[7].tolist()]
+    assert front.subset(front.numbers == 7).corners.tolist() == [front.corners[7].tolist()]
 
 
 def test_pose_turns_to_the_left_and_shrinks_with_distance() -> None:
@@ -38,9 +38,9 @@ def test_sliders_give_a_person_within_the_bounds(data: Path) -> None:
 
 
 def test_sliders_move_the_mesh(data: Path) -> None:
-    places = Places.of("front")
+    places = LandmarkAnchors.of("front")
     sliders = Sliders(data, {}, places.corners)
     plain = sliders.person(np.zeros(len(sliders.names)))
     wide = plain | {"nose_width": 1.0}
-    one, other = (places.on(sliders.mesh(person)) for person in (plain, wide))
+    one, other = (places.positions(sliders.mesh(person)) for person in (plain, wide))
     assert 0.001 < np.abs(one - other).max() < 0.05

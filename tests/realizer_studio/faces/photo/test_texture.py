@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from realizer.core.colours import linear, srgb
-from realizer_studio.faces.photo.fit import Fit, Sight
-from realizer_studio.faces.photo.shape import Places, Pose
+from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.photo.shape import LandmarkAnchors, Pose
 from realizer_studio.faces.photo.texture import Painter, Projected, projected, unlit
 from realizer_studio.faces.skin.skin import Skin
 from tests.realizer_studio.faces.photo.test_fit import view
@@ -18,8 +18,8 @@ SCALE = 2000.0
 AHEAD = Pose(np.zeros(3), SCALE, np.array([250.0, 200.0]))
 
 
-def sight(image: Image.Image) -> Sight:
-    return Sight(view(np.zeros((468, 2)), 0, image), Places.of("front"), np.zeros((468, 2)))
+def sight(image: Image.Image) -> Observation:
+    return Observation(view(np.zeros((468, 2)), 0, image), LandmarkAnchors.of("front"), np.zeros((468, 2)))
 
 
 def picture(spot: tuple[float, float], skin: tuple[int, int, int] = (190, 140, 110)) -> Image.Image:
@@ -51,7 +51,7 @@ def test_unlit_takes_the_light_out_and_leaves_spots() -> None:
 
 def test_projected_counts_what_faces_the_camera_and_lies_inside(skin: Skin) -> None:
     seen = projected(skin, sight(picture((250, 250))), AHEAD, both=True)
-    cheek = near(skin, skin.person.ground.point("5.3"), 0.01)
+    cheek = near(skin, skin.person.figure.point("5.3"), 0.01)
     assert seen.weight[cheek].mean() > 0.6
     aside = Pose(np.array([0, np.pi, 0]), SCALE, np.array([250.0, 200.0]))
     assert projected(skin, sight(picture((250, 250))), aside, both=True).weight[cheek].mean() < 0.1
@@ -60,7 +60,7 @@ def test_projected_counts_what_faces_the_camera_and_lies_inside(skin: Skin) -> N
 
 
 def test_painter_paints_a_spot_where_both_pictures_show_it(skin: Skin) -> None:
-    place = skin.person.ground.point("9.3")  # the tip of the nose
+    place = skin.person.figure.point("9.3")  # the tip of the nose
     shown = sight(picture(tuple(AHEAD([place])[0][0])))
     fit = Fit({}, (shown, shown), (AHEAD, AHEAD))
     albedo = np.tile(np.float32([200, 160, 130]), (len(skin.at), 1))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer_studio.faces.photo.fit import Fit, Sight
-from realizer_studio.faces.photo.shape import Places, Pose, Sliders
+from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.photo.shape import LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.warp import WARP, Warp, read_warp, warp_of
 from tests.realizer_studio.faces.photo.test_fit import SCALE, view
 
@@ -17,13 +17,13 @@ from tests.realizer_studio.faces.photo.test_fit import SCALE, view
 @pytest.fixture(scope="module")
 def fitted(data: Path) -> tuple[Fit, np.ndarray, np.ndarray]:
     """A fit, its mesh, and the mesh of which its pictures are: the chin of the latter juts out."""
-    places = Places.of("front"), Places.of("side")
+    places = LandmarkAnchors.of("front"), LandmarkAnchors.of("side")
     sliders = Sliders(data, {}, np.concatenate([part.corners for part in places]))
     at = sliders.mesh(sliders.person(np.zeros(len(sliders.names))))
     true = at + 0.008 * np.exp(-((at[:, 1:2] - at[:, 1].min()) ** 2) / 0.04**2) * (0, -0.5, 1)
     poses = (Pose(np.zeros(3), SCALE, np.zeros(2)), Pose(np.array([0, 0.8, 0]), SCALE, np.zeros(2)))
     sights = tuple(
-        Sight(view(np.zeros((468, 2)), 0), part, pose(part.on(true))[0])
+        Observation(view(np.zeros((468, 2)), 0), part, pose(part.positions(true))[0])
         for part, pose in zip(places, poses, strict=True)
     )
     return Fit({}, sights, poses), at, true
@@ -33,9 +33,9 @@ def test_warp_moves_the_face_to_where_the_pictures_show_it(
     fitted: tuple[Fit, np.ndarray, np.ndarray],
 ) -> None:
     fit, at, true = fitted
-    places = fit.sights[0].places
-    before = np.linalg.norm(places.on(at) - places.on(true), axis=1)
-    after = np.linalg.norm(places.on(warp_of(fit, at)(at)) - places.on(true), axis=1)
+    places = fit.observations[0].anchors
+    before = np.linalg.norm(places.positions(at) - places.positions(true), axis=1)
+    after = np.linalg.norm(places.positions(warp_of(fit, at)(at)) - places.positions(true), axis=1)
     assert before.max() > 0.006
     assert after.max() < 0.7 * before.max()
     assert after.mean() < 0.6 * before.mean()

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.xdist_group("mask")
 def test_paint_albedo_keeps_the_colour_of_the_skin_and_reddens_lips(skin: Skin) -> None:
     none = np.zeros(len(skin.at), np.float32)
     colours = paint_albedo(skin, none, none)
-    forehead = np.linalg.norm(skin.at - skin.person.ground.point("9.12") - [0, 0.03, 0], axis=1) < 0.012
+    forehead = np.linalg.norm(skin.at - skin.person.figure.point("9.12") - [0, 0.03, 0], axis=1) < 0.012
     assert colours[forehead].mean(axis=0) == pytest.approx(skin.recipe.colours["skin"], rel=0.08)
     lips = colours[skin.red > 0.95].mean(axis=0)
     assert lips[0] - lips[1] > colours[forehead, 0].mean() - colours[forehead, 1].mean()
@@ -25,10 +25,10 @@ def test_paint_albedo_keeps_the_colour_of_the_skin_and_reddens_lips(skin: Skin) 
 def test_paint_albedo_darkens_brows(skin: Skin) -> None:
     none = np.zeros(len(skin.at), np.float32)
     light = paint_albedo(skin, none, none).mean(axis=1)
-    forehead = skin.person.ground.point("9.12") + np.array([0, 0.03, 0])
+    forehead = skin.person.figure.point("9.12") + np.array([0, 0.03, 0])
     dark, plain = (
         light[np.linalg.norm(skin.at - at, axis=1) < far].mean()
-        for at, far in ((skin.person.ground.point("4.3"), 0.005), (forehead, 0.012))
+        for at, far in ((skin.person.figure.point("4.3"), 0.005), (forehead, 0.012))
     )
     assert dark < 0.6 * plain
 

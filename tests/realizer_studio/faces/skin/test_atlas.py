@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from realizer_studio.faces.parts import Part, Submesh
-from realizer_studio.faces.person.makehuman import BaseMesh, Ground
+from realizer_studio.faces.person.makehuman import BaseMesh, Figure
 from realizer_studio.faces.skin.atlas import EYES, HAIR, NEUTRAL, corners, packed
 
 pytestmark = pytest.mark.xdist_group("mask")
 
 
-def test_corners_puts_left_to_the_right_and_up_to_the_top(ground: Ground, parts: list[Part]) -> None:
+def test_corners_puts_left_to_the_right_and_up_to_the_top(figure: Figure, parts: list[Part]) -> None:
     patch = parts[0].patch
     assert patch is not None
-    places = corners(ground.mesh, patch)
+    places = corners(figure.mesh, patch)
     middle, face = places.mean(axis=1), parts[0].vertices[patch.triangles].mean(axis=1)
     head = middle[:, 1] < 0.645
     middle, face = middle[head], face[head]

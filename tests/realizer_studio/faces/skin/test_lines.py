@@ -45,6 +45,6 @@ def test_weights_show_a_region_at_its_lines_only(skin: Skin) -> None:
     shown = weights(skin, lines, vertex_normals(part.vertices, part.triangles))
     frown = shown[:, regions(lines).index("frown_left")]
     assert frown.max() > 0.5
-    chin = np.linalg.norm(part.vertices - skin.person.ground.point("2.1"), axis=1) < 0.03
+    chin = np.linalg.norm(part.vertices - skin.person.figure.point("2.1"), axis=1) < 0.03
     assert frown[chin].max() == 0
     assert shown.sum(axis=1).max() <= 1.0001

@@ -12,7 +12,7 @@ pytestmark = pytest.mark.xdist_group("mask")
 
 def at(skin: Skin, name: str) -> int:
     """Return the texel nearest to a feature point."""
-    return int(np.argmin(np.linalg.norm(skin.at - skin.person.ground.point(name), axis=1)))
+    return int(np.argmin(np.linalg.norm(skin.at - skin.person.figure.point(name), axis=1)))
 
 
 def test_red_is_on_the_lips_only(skin: Skin) -> None:

@@ -10,7 +10,7 @@ import pytest
 from realizer.animation.fap.fap_reader import read_fap
 from realizer_studio.analysis.faps_from_points import read_points
 from realizer_studio.tracking.markers.colours import named
-from realizer_studio.tracking.markers.film import FORMATS, Look, Markers, faps_of, track_markers
+from realizer_studio.tracking.markers.film import FORMATS, Markers, MarkerSettings, faps_of, track_markers
 from realizer_studio.tracking.markers.layout import wojdel
 from realizer_studio.tracking.network import TrackingError
 from tests.painted import acted, hidden, plain, truth
@@ -23,7 +23,7 @@ def tracked() -> Markers:
     """Markers of ada, who raises the brows and opens the mouth; some are hidden."""
     gone = hidden(30, 0.02, 1)
     gone[0] = False
-    return track_markers(plain(truth("ada", acted()), gone), Look(COLOURS), "film")
+    return track_markers(plain(truth("ada", acted()), gone), MarkerSettings(COLOURS), "film")
 
 
 def test_track_markers_finds_them_to_a_pixel(tracked: Markers) -> None:
@@ -31,7 +31,7 @@ def test_track_markers_finds_them_to_a_pixel(tracked: Markers) -> None:
     assert np.median(off) < 0.5
     assert off.max() < 3
     assert tracked.layout.names == wojdel().names
-    assert tracked.seen.mean() == pytest.approx(0.98, abs=0.015)
+    assert tracked.visible.mean() == pytest.approx(0.98, abs=0.015)
 
 
 def test_faps_of_markers_are_those_of_the_face(tracked: Markers) -> None:
@@ -56,7 +56,7 @@ def test_formats_have_the_points(tracked: Markers) -> None:
 
 def test_track_markers_numbers_any_other_markers() -> None:
     few = truth("ada", acted(8))[:, [3, 4, 19, 25, 26]]
-    markers = track_markers(plain(few), Look(COLOURS[:1]), "film")
+    markers = track_markers(plain(few), MarkerSettings(COLOURS[:1]), "film")
     assert markers.layout.names == ("1", "2", "3", "4", "5")
     assert markers.pixels == pytest.approx(few, abs=1)
     with pytest.raises(TrackingError, match="wanted two feature points of MPEG-4 or more"):
@@ -66,14 +66,14 @@ def test_track_markers_numbers_any_other_markers() -> None:
 def test_track_markers_puts_an_uneven_film_on_an_even_rate() -> None:
     shown = list(plain(truth("ada", acted(10))))
     late = [shown[k].__class__(k / 25 + (0.01 if k % 2 else 0), shown[k].image, "p") for k in range(10)]
-    markers = track_markers(late, Look(COLOURS, neutral=0), "film", fps=50)
+    markers = track_markers(late, MarkerSettings(COLOURS, neutral=0), "film", fps=50)
     assert (markers.fps, len(markers.points)) == (50, 19)
     assert np.isfinite(markers.points).all()
 
 
 def test_track_markers_says_what_was_found_instead() -> None:
     with pytest.raises(TrackingError, match=r"film: wanted markers of the colours red, found 0"):
-        track_markers(plain(truth("ada", acted(2))), Look((named("red"),)), "film")
+        track_markers(plain(truth("ada", acted(2))), MarkerSettings((named("red"),)), "film")
     grey = [
         one.__class__(one.time, one.image.convert("L").convert("RGB"), one.name)
         for one in plain(truth("ada", acted(2)))
@@ -81,8 +81,8 @@ def test_track_markers_says_what_was_found_instead() -> None:
     with pytest.raises(
         TrackingError, match=r"film: wanted markers of the colours green, blue, found 0 in most"
     ):
-        track_markers(grey, Look(COLOURS), "film")
+        track_markers(grey, MarkerSettings(COLOURS), "film")
     with pytest.raises(TrackingError, match=r"wanted a picture from 0 to 1 as --neutral, got 9"):
-        track_markers(plain(truth("ada", acted(2))), Look(COLOURS, neutral=9), "film")
+        track_markers(plain(truth("ada", acted(2))), MarkerSettings(COLOURS, neutral=9), "film")
     with pytest.raises(TrackingError, match=r"wanted the 31 markers of the layout, found 5"):
-        track_markers(plain(truth("ada", acted(2))[:, :5]), Look(COLOURS, wojdel()), "film")
+        track_markers(plain(truth("ada", acted(2))[:, :5]), MarkerSettings(COLOURS, wojdel()), "film")

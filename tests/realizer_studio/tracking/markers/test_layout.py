@@ -14,7 +14,7 @@ from tests.painted import acted, layout_in_pixels, truth
 
 def test_wojdel_has_31_points_in_her_unit() -> None:
     layout = wojdel()
-    at = dict(zip(layout.names, layout.places, strict=True))
+    at = dict(zip(layout.names, layout.positions, strict=True))
     assert (len(layout), layout.colours.sum()) == (31, 2)
     assert at["20"] == pytest.approx([0, 0])
     assert at["3"][0] - at["2"][0] == pytest.approx(1)
@@ -30,7 +30,7 @@ def test_constraints_hold_in_expressions_and_break_in_a_wrong_order() -> None:
     shown = truth("ada", acted()) * (1, -1)
     assert not any(broken(places, rules).any() for places in shown)
     assert {*rules.ravel().tolist()} == {*range(31)}
-    exchanged = layout.places.copy()
+    exchanged = layout.positions.copy()
     exchanged[[10, 19]] = exchanged[[19, 10]]
     counts = broken(exchanged, rules)
     assert min(counts[10], counts[19]) >= 2
@@ -45,7 +45,7 @@ def test_constraints_of_points_on_a_line_are_none() -> None:
 
 def test_numbered_goes_from_the_upper_left_to_the_lower_right() -> None:
     layout = numbered(np.array([[50.0, 100, 1], [90, 11, 0], [10, 10, 0], [50, 12, 0]]))
-    assert layout.places.tolist() == [[10, -10], [50, -12], [90, -11], [50, -100]]
+    assert layout.positions.tolist() == [[10, -10], [50, -12], [90, -11], [50, -100]]
     assert (layout.names, layout.colours.tolist()) == (("1", "2", "3", "4"), [0, 0, 0, 1])
 
 

@@ -29,7 +29,7 @@ def test_order_is_right_where_dots_are_hidden() -> None:
 
 def test_order_goes_back_from_the_picture_at_rest() -> None:
     way = truth("ada", acted(20)) * (1, -1)
-    found = order([seen(places) for places in way], layout_in_pixels("ada").at(way[12]), 12)
+    found = order([seen(places) for places in way], layout_in_pixels("ada").with_positions(way[12]), 12)
     assert found == pytest.approx(way)
 
 
@@ -37,7 +37,7 @@ def test_order_ignores_other_blobs_and_follows_a_head_that_moves() -> None:
     rest = layout_in_pixels("ada")
     follow = Order(rest)
     for k in range(10):
-        moved = rest.places + np.array([7.0 * k, -5.0 * k])
+        moved = rest.positions + np.array([7.0 * k, -5.0 * k])
         noise = np.array([[700.0, -20, 0], [30, -500, 1], [*(moved[0] + (0, 20)), 0]])
         assert follow(np.vstack([seen(moved), noise])) == pytest.approx(moved)
 
@@ -46,7 +46,7 @@ def test_order_finds_a_face_again_that_was_away() -> None:
     rest = layout_in_pixels("ada")
     follow = Order(rest)
     assert np.isnan(follow(np.zeros((0, 3)))).all()
-    away = rest.places + np.array([150, -60])
+    away = rest.positions + np.array([150, -60])
     assert follow(seen(away)) == pytest.approx(away)
 
 
@@ -54,22 +54,22 @@ def test_order_keeps_the_constraints_of_the_face() -> None:
     rest = layout_in_pixels("ada")
     gone = np.zeros(31, bool)
     gone[19] = True  # the nose is hidden, and something green appears above the eyes near a brow
-    false = np.array([[*(rest.places[3] + (4, 14)), 0]])
-    found = Order(rest)(np.vstack([seen(rest.places, 0, gone), false]))
+    false = np.array([[*(rest.positions[3] + (4, 14)), 0]])
+    found = Order(rest)(np.vstack([seen(rest.positions, 0, gone), false]))
     assert np.isnan(found[19]).all()
-    assert found[~gone] == pytest.approx(rest.places[~gone])
+    assert found[~gone] == pytest.approx(rest.positions[~gone])
 
 
 @pytest.mark.parametrize("turn", [-20, 0, 15])
 def test_locate_lays_the_layout_on_a_turned_face(turn: int) -> None:
     angle = np.radians(turn)
     matrix = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    places = layout_in_pixels("ben").places @ matrix.T * 0.7 + (100, 20)
+    places = layout_in_pixels("ben").positions @ matrix.T * 0.7 + (100, 20)
     blobs = seen(places)
     placed, off = locate(wojdel(), blobs)
     assert placed is not None
     assert nearest(placed, wojdel(), blobs) == pytest.approx(places)
-    assert off < 0.1 * wojdel().at(places).size
+    assert off < 0.1 * wojdel().with_positions(places).size
 
 
 def test_locate_finds_nothing_among_few_blobs() -> None:

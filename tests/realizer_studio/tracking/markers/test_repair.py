@@ -49,8 +49,8 @@ def test_normalised_takes_place_size_and_roll_of_the_head_out() -> None:
 
 
 def test_normalised_turns_other_layouts_as_at_rest() -> None:
-    rest = numbered(np.column_stack([wojdel().places[:9] * (1, -1), np.zeros(9)]))
-    way = np.stack([rest.places * 5 + k for k in range(3)])
+    rest = numbered(np.column_stack([wojdel().positions[:9] * (1, -1), np.zeros(9)]))
+    way = np.stack([rest.positions * 5 + k for k in range(3)])
     assert normalised(rest, way) == pytest.approx(
-        np.repeat(normalised(rest, rest.places[None]), 3, axis=0), abs=1e-9
+        np.repeat(normalised(rest, rest.positions[None]), 3, axis=0), abs=1e-9
     )
