@@ -11,7 +11,7 @@ from realizer.cli import inputs, options
 from realizer.cli.options import option
 from realizer.cli.progress import note
 from realizer.core.settings import Settings
-from realizer_studio.cli.edit_face import serve_tab
+from realizer_studio.cli.faces import serve_tab
 from realizer_studio.cli.marker_options import follow as follow_markers
 from realizer_studio.cli.marker_options import marker_options, marker_settings
 from realizer_studio.cli.track import follow as follow_faces

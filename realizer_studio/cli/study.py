@@ -73,8 +73,7 @@ def make(folder: Path, kinds: tuple[str, ...], judges: int, seed: int | None, **
 
     Hand out the folder, with a number to each judge, and keep the key. Answers come back as CSV.
     """
-    from realizer_studio.study.kit import check_folder, write_kit
-    from realizer_studio.study.plan import Plan
+    from realizer_studio.study.kit import Plan, check_folder, write_kit
     from realizer_studio.tracking.network import TrackingError
 
     with inputs.reporting(ValueError):
@@ -126,8 +125,8 @@ def analyse(
 
     Judges who failed more than a quarter of their attention items are named and left out.
     """
+    from realizer_studio.study.analysis import write_report
     from realizer_studio.study.answers import inattentive, read_answers, read_key
-    from realizer_studio.study.report import write_report
 
     key = _key(key, files)
     truths = read_key(key)

@@ -16,8 +16,7 @@ from realizer.tables import action_units, au_to_fap
 from realizer.tables.lexemes import SIDES
 from realizer.tables.templates import PREFIX
 from realizer.tables.timing import gaps
-from realizer_studio.corpus.learn import faps_of, features
-from realizer_studio.corpus.matching_pursuit import explain
+from realizer_studio.corpus.learn import explain, faps_of, features
 from realizer_studio.corpus.recording import Recording, Segment
 from realizer_studio.corpus.statistics import FEWEST, Study
 

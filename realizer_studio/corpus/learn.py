@@ -1,4 +1,4 @@
-"""Principal components and a self-organising map of the faces of a corpus (Wojdel 2005, 7.2, 7.3)."""
+"""Features of the faces of a corpus, matching pursuit, and a self-organising map (Wojdel 2005, 7.2, 7.3)."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,6 +18,33 @@ from realizer.core.toml_text import parse_toml
 from realizer.tables import HEAD_COLUMNS, faps
 from realizer.tables.templates import templates
 from realizer_studio.corpus.recording import CorpusError, Recording
+
+
+def explain(faces: Float64, shapes: Float64, most: int, least_gain: float) -> tuple[list[int], Float64]:
+    """Return rows of shapes (m, d) that approximate faces (n, d), and their weights (n, chosen rows).
+
+    Rows are chosen one after the other, each the one that reduces the residual most.
+
+    Args:
+        most: the largest number of rows.
+        least_gain: the least share of the squared displacement that one more row explains.
+    """
+    from scipy.optimize import nnls
+
+    total = float(np.sum(faces**2))
+    lengths = np.maximum(np.linalg.norm(shapes, axis=1), 1e-9)
+    chosen: list[int] = []
+    weights = np.zeros((len(faces), 0))
+    while len(chosen) < most:
+        residual = faces - weights @ shapes[chosen]
+        gains = np.sum(np.maximum(residual @ (shapes / lengths[:, None]).T, 0) ** 2, axis=0)
+        gains[chosen] = 0
+        if gains.max() <= least_gain * total:
+            break
+        chosen.append(int(gains.argmax()))
+        weights = np.stack([nnls(shapes[chosen].T, face)[0] for face in faces])
+    return chosen, weights
+
 
 VARIANCE = 0.9  # of the data that the components keep
 FAR = 0.3  # of the frames, those farthest from the mean, train the map; Wojdel's show expressions in 28 %

@@ -1,4 +1,4 @@
-"""A writer of a study's folder, which a browser opens, and of the key to its answers beside it."""
+"""The plan of a study, and a writer of its folder, which a browser opens, and of its key beside it."""
 
 import hashlib
 import json
@@ -6,14 +6,80 @@ import os
 import secrets
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from realizer.core.atomic_files import write_text
-from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item
+from realizer.face.load import list_faces
+from realizer_studio.study.drawing import Drawer, Variant
+from realizer_studio.study.films import films
+from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item, checks, displacements, naming
+from realizer_studio.study.matching import TRIPLES, Reference, matching, references
+
+MATCHING = ("visual", "emotional")
+# Approximate numbers of pictures or films for each variant.
+DRAWN = {"visual": 300, "emotional": 300, "naming": 36, "displacements": 129, "films": 16}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The plan of a study."""
+
+    kinds: Sequence[str]  # of `KINDS`
+    variants: Sequence[Variant]  # the variants of faces to compare
+    source: str | None = None  # the references: a folder of photographs, a face, or None for another face
+    language: str = "en"  # of films
+    most: int | None = None  # largest number of questions of each kind, or None
+    seed: int = 0  # of all random choices
+
+    @property
+    def drawn(self) -> int:
+        """The approximate number of pictures."""
+        return sum({DRAWN[kind] for kind in self.kinds}) * len(self.variants)
+
+    def items(self, step: Callable[[int], object] = lambda count: None) -> list[Item]:
+        """Return all questions, with attention items; raises errors of `references`, `matching` and `films`.
+
+        `step` is called with 1 after each picture or film.
+        """
+        draws = np.random.default_rng(self.seed)
+        found: list[Item] = []
+        with Drawer(step) as draw:
+            if matched := [kind for kind in MATCHING if kind in self.kinds]:
+                references_ = self._references(draw, draws)
+                for variant in self.variants:
+                    found += matching(matched, variant, references_, draw, draws)
+            if "naming" in self.kinds:
+                found += naming(self.variants, draw)
+            if "displacements" in self.kinds:
+                found += displacements(self.variants, draw)
+        if "films" in self.kinds:
+            film_texts = texts()[self.language]["films"][: self.most]
+            found += films(self.variants, film_texts, self.language, draws, step)
+        chosen: list[Item] = []
+        for kind in [kind for kind in KINDS if kind in self.kinds]:
+            of_kind = [item for item in found if item.kind == kind]
+            if self.most is not None and len(of_kind) > self.most:
+                of_kind = [of_kind[k] for k in draws.choice(len(of_kind), self.most, replace=False)]
+            chosen += [*of_kind, *checks(of_kind, draws)]
+        return chosen
+
+    def _references(self, draw: Drawer, draws: np.random.Generator) -> list[Reference]:
+        """Return the references, limited to the number that is needed."""
+        used = [one.face for one in self.variants]
+        unused = (info.name for info in list_faces() if info.name not in used)
+        source = self.source or next(unused, used[0])
+        references_ = references(source, draw)
+        if self.most is None:
+            return references_
+        return [references_[k] for k in draws.permutation(len(references_))[: -(-self.most // TRIPLES)]]
+
 
 ITEMS, TEXTS, PAGE = "items.js", "texts.js", "index.html"
 SAVED = 1_000_000_000  # modification time of all files, in seconds, which hides their order

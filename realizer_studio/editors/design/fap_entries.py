@@ -17,8 +17,7 @@ from realizer.expressions.timeline import Entry
 from realizer.expressions.timeline_file import MIN_SECONDS
 from realizer.tables import HEAD_COLUMNS
 from realizer_studio.corpus.find import runs
-from realizer_studio.corpus.learn import faps_of, features
-from realizer_studio.corpus.matching_pursuit import explain
+from realizer_studio.corpus.learn import explain, faps_of, features
 from realizer_studio.corpus.recording import Recording
 
 FPS = 25.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +10,10 @@ import numpy as np
 import pytest
 
 from realizer_studio.corpus.statistics import Table
-from realizer_studio.study.analysis import PAUL, matching, scores, tables
+from realizer_studio.study.analysis import PAUL, matching, scores, tables, write_report
 from realizer_studio.study.answers import Answer, read_answers
 from realizer_studio.study.items import EMOTIONS, Item
-from tests.studies import displaced, key, line, matches, named, picture, simulated, write
+from tests.studies import displaced, key, kit, line, matches, named, picture, simulated, write
 
 
 def answered(tmp_path: Path, found: dict[str, Any], rows: list[list[object]]) -> list[Answer]:
@@ -122,3 +123,18 @@ def test_agreement_of_scores_counts_their_distance(tmp_path: Path) -> None:
     assert shown["alpha"] == pytest.approx(1 - 5 * 2 / (2 * (9 * 4 + 4 * 2 + 1 * 2 + 4 + 1 + 1)), abs=0.2)
     assert shown["judges"] == 2
     assert row(table(tables(answered(tmp_path, found, rows)), "4.4"), "people")["score 1"] == 1
+
+
+def test_write_report_shows_the_items_answered_worst_with_their_pictures(tmp_path: Path) -> None:
+    key = json.loads(kit(tmp_path / "s", matches(20)).read_text())
+    names = list(key["items"])
+    rows = [line(key, name, "right" if k else "added") for k, name in enumerate(names)]
+    answers = read_answers([write(tmp_path / "a.csv", rows)], key)
+    written = write_report(tmp_path / "out", key, answers, tmp_path / "s", keep=False)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(written)
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert page.index("answers: added 1") < page.index("answers: right 1")
+    assert page.count("<figure>") == 12
+    assert page.count("data:image/webp") == 12 * 5
+    write_report(tmp_path / "out", key, answers, tmp_path / "none", keep=False)
+    assert "<img" not in (tmp_path / "out" / "report.html").read_text()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from realizer_studio.study import kit as kits
+from realizer_studio.study.drawing import Variant
 from realizer_studio.study.judge import read_items
-from realizer_studio.study.kit import check_folder, key_of, texts, write_kit
+from realizer_studio.study.kit import Plan, check_folder, key_of, texts, write_kit
 from tests.studies import ABOUT, displaced, kit, matches, named
 
 
@@ -95,3 +97,20 @@ def test_texts_say_the_same_in_each_language() -> None:
     english, *others = map(shape, texts().values())
     assert set(texts()) == {"en", "de", "pl"}
     assert all(other == english for other in others)
+
+
+def test_plan_counts_what_it_draws() -> None:
+    two = (Variant("ada"), Variant("ben"))
+    assert Plan(("visual", "emotional"), two).drawn == 2 * Plan(("visual",), two[:1]).drawn
+
+
+@pytest.mark.gl
+@pytest.mark.slow
+@pytest.mark.long
+def test_items_of_one_seed_are_the_same() -> None:
+    plan = Plan(("naming", "visual"), (Variant("ada"),), "ben", most=4, seed=3)
+    one, two = plan.items(), plan.items()
+    assert Counter(item.kind for item in one if not item.check) == {"visual": 4, "naming": 4}
+    assert Counter(item.kind for item in one if item.check) == {"visual": 2, "naming": 2}
+    assert [item.truth for item in one] == [item.truth for item in two]
+    assert [item.options for item in one] == [item.options for item in two]
