@@ -262,7 +262,7 @@ async def _send_bml(hub: Hub, request: Request) -> Response:
     text = document if isinstance(document, str) else _text(document)
     async with hub.joined(_Listener(), name, visitor) as number:
         hub.sessions.receive(number, text)
-        await hub.sessions.wait_for_room(number)
+        await hub.attend(request, hub.sessions.wait_for_room(number))
     return JSONResponse({"session": name}, HTTPStatus.ACCEPTED)
 
 

@@ -143,7 +143,8 @@ class _Transport:
 
     def __init__(self, transport: asyncio.Transport, connection: Connection) -> None:
         self._transport = transport
-        self.write = transport.write
+        self.write = transport.write  # attributes of its own are found faster
+        self.get_write_buffer_size = transport.get_write_buffer_size
         self.pause_reading = connection.pause_reading
         self.resume_reading = connection.resume_reading
         self.set_protocol = connection.switch

@@ -292,6 +292,7 @@ class SessionHost:
         blocks = [p.block for session in sessions for p in session.player.blocks.all()]
         blocks += [p.block for session in sessions for p in session.submission.pending.blocks]
         self._gc_policy.collect_if_needed(len(self._clients), sum(len(block.behaviours) for block in blocks))
+        self.metrics.count()
         now = self._loop.time()
         self._overload.end_if_over(now)
         self._registry.remove_expired(now)

@@ -20,7 +20,7 @@ OK = re.compile(rb"HTTP/1\.[01] 200 ")
 LENGTH = re.compile(rb"(?im)^(Content-Length:\s*)\d+")
 UNAVAILABLE = (
     b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain; charset=utf-8\r\n"
-    b"Content-Length: 17\r\nConnection: close\r\n\r\nno worker answers"
+    b"Content-Length: 17\r\nRetry-After: 5\r\nConnection: close\r\n\r\nno worker answers"
 )
 
 
