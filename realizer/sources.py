@@ -33,8 +33,8 @@ _PIECE = re.compile(
     re.DOTALL,
 )
 # What begins a document: an element that is neither SSML nor HTML inside of a text, or <bml> anywhere.
-_BEGINNING = re.compile(r"[\s\ufeff]*<(?:[?!]|(?:[\w.-]+:)?([A-Za-z_][\w.-]*)(?=[\s/>]))")
-_DOCUMENT = re.compile(r"<(?:[\w.-]+:)?(?:bml|speak|act|fml-apml)[\s/>]")
+_BEGINNING = re.compile(r"[\s\ufeff]*<(?:[?!]|(?:[\w.-]+:)?([A-Za-z_][\w.-]*)(?=[\s/>]|$))")
+_DOCUMENT = re.compile(r"<(?:[\w.-]+:)?(?:bml|speak|act|fml-apml)(?=[\s/>]|$)")
 NOTHING = BMLError("wanted <bml>, or a text to speak, got nothing", line=1)
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
 
@@ -123,7 +123,8 @@ def spoken(text: str, number: int = 1, *, language: str = "en", plain: bool = Fa
     documents = []
     for k, parts in enumerate(_divided((text,) if plain else said.parts)):
         block = text_block(markup(parts), Chunk("speech", number))
-        remark = {UNSAID: warnings} if warnings and not k else {}
+        unsaid = "; ".join([warnings] * (warnings != "" and not k) + [fault.text for fault in block.problems])
+        remark = {UNSAID: unsaid} if unsaid else {}
         children = tuple(
             replace(node, unknown_attributes=remark) if isinstance(node, Speech) else node
             for node in block.children

@@ -1,7 +1,7 @@
 """Blocks that speak a text with syncs, SSML and behaviours, or a sound clip."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from xml.sax.saxutils import escape, quoteattr, unescape
@@ -51,15 +51,20 @@ class Chunk:
         return f'<bml xmlns="{CORE}"{namespaces} id="{self.block}"{character}>{inside}</bml>'
 
 
-def text_block(text: str, chunk: Chunk) -> Block:
+def text_block(text: str, chunk: Chunk, faults: Iterable[str] = ()) -> Block:
     """Return the block that speaks a text.
 
     <sync id="m"/> is a sync point of the speech, other SSML goes to the voice. A behaviour needs no id;
     without a sync reference it starts at its place in the text. `ID:m` refers to a sync of the speech, also
     in earlier chunks. Text that is no XML or has invalid syncs is spoken without its tags. Faults of the
     markup are a problem of the block, and lose no words.
+
+    Args:
+        faults: further ones, of the text from which this one comes.
     """
     parser = _Text(chunk)
+    for fault in faults:
+        parser.add_fault(fault)
     parser.read(sanitized(text))
     (item, *others) = read(chunk.document(parser.content()), VOCABULARY)
     block = item if isinstance(item, Block) and not others else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import secrets
 from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Unpack
@@ -13,7 +14,13 @@ from realizer.client.connection import Connection, address_of
 from realizer.client.errors import ClientError, ClosedError
 from realizer.client.message_router import Frame
 from realizer.client.speech import Speech
-from realizer.client.stream_options import FrameOptions, PictureOptions, SoundOptions, SpeechOptions
+from realizer.client.stream_options import (
+    FrameOptions,
+    PictureOptions,
+    SoundOptions,
+    SpeechOptions,
+    TextOptions,
+)
 from realizer.client.subscriptions import play_out, take, take_subscribed
 from realizer.client.voice import OnWord, Pcm, Timed, Voice, content_of, timed
 from realizer.protocol.streams import STREAMS
@@ -137,7 +144,7 @@ class Client:
 
         Args:
             id: id of the speech and of its block; other blocks refer to a sync of its text as `ID:ID:sync`.
-            opening: composition, character and language, as in the message `speech`.
+            opening: composition, character, language and plain, as in the message `speech`.
         """
         speech = Speech(id, opening, self._connection.control, self.wait_for, self._connection.check)
         speech.earlier, self._speeches[id] = self._speeches.get(id), speech
@@ -166,6 +173,25 @@ class Client:
         voice = Voice(rate, fields, self._connection.post, self._connection.control, self.wait_for, on_word)
         self._router.waiters.add(voice.progress)
         return voice
+
+    async def speak(self, text: str, **opening: Unpack[TextOptions]) -> BlockProgress:
+        """Speak a text and return its end; `said` are the words that were spoken, if it was cut off.
+
+        Markdown, stage directions, emoji and numbers are read as people mean them; SSML and behaviours stay
+        what they are.
+
+        Args:
+            opening: id of the block, composition, character, language, and `plain` for a text without all
+                that, as in the message `speech`.
+
+        Raises:
+            ClientError: the service refuses it, or the connection has ended.
+        """
+        fields: dict[str, Any] = {"id": f"speak-{secrets.token_hex(6)}", **opening}
+        speech = self.speech(**fields)
+        await speech.append(text)
+        await speech.close()
+        return await speech.ended()
 
     async def say(
         self,

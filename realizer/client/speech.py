@@ -162,7 +162,7 @@ class Speech(OpenSpeech):
         self._pausing: asyncio.Task[None] | None = None
 
     async def append(self, text: str) -> None:
-        """Append text, which may contain <sync id="m"/>, SSML and behaviours; whole sentences are spoken.
+        """Append text, which may contain Markdown, <sync id="m"/>, SSML and behaviours; sentences are spoken.
 
         It is sent at once, or a moment after the last message.
 

@@ -33,3 +33,11 @@ class SpeechOptions(TypedDict, total=False):
 
     character: str
     composition: Literal["MERGE", "APPEND", "REPLACE"]
+
+
+class TextOptions(SpeechOptions, total=False):
+    """The id of speech that comes as text, its language, and whether it has no Markdown and the like."""
+
+    id: str
+    language: str
+    plain: bool

@@ -152,6 +152,7 @@ class SyncClient(Synchronous[Client]):
     subscribe = waiting(Client.subscribe)
     state = waiting(Client.state)
     play = waiting(Client.play)
+    speak = waiting(Client.speak)
     say = waiting(Client.say)
     film = waiting(Client.film)
     feedback = iterating(Client.feedback)

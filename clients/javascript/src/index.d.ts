@@ -77,6 +77,12 @@ export interface SpeechOptions {
   id?: string;
 }
 
+/** Of speech that comes as text. */
+export interface TextOptions extends SpeechOptions {
+  /** Whether the text has no Markdown, stage directions and the like. */
+  plain?: boolean;
+}
+
 export interface SayOptions extends SpeechOptions {
   /** Samples a second of PCM; without it the sound is a file. */
   rate?: number;
@@ -129,7 +135,8 @@ export class Realizer {
   play(bml: string): Promise<Element>;
   ended(block: string): Promise<Element>;
   say(sound: Pcm, options?: SayOptions): Promise<Element>;
-  speech(id?: string, options?: Omit<SpeechOptions, "id">): Speech;
+  speak(text: string, options?: TextOptions): Promise<Element>;
+  speech(id?: string, options?: Omit<TextOptions, "id">): Speech;
   stop(...blocks: string[]): Promise<null>;
   voice(options: SpeechOptions & { rate: number }): Voice;
   subscribe(stream: string, options?: SubscribeOptions, take?: (frame: Frame) => void): Promise<StreamInfo>;

@@ -289,6 +289,19 @@ export class Realizer {
   }
 
   /**
+   * Speak a text. Markdown, stage directions, emoji and numbers are read as people mean them, SSML and behaviours as what they are.
+   * @param {string} text
+   * @param {object} [options] id of the block; language, character, composition, and plain for a text without all that, as in the message `speech`
+   * @returns {Promise<Element>} its end; rejects if it is refused
+   */
+  async speak(text, { id, ...opening } = {}) {
+    const speech = this.speech(id, opening);
+    await speech.append(text);
+    speech.close();
+    return speech.ended();
+  }
+
+  /**
    * Open a speech whose text is sent as it comes.
    * @param {string} [id] of the speech and of its block: a letter or _, then up to 63 letters, digits, - and _. Other blocks refer to a sync of its text as `ID:ID:sync`
    * @param {object} [opening] language, character, composition: as in the message `speech`

@@ -35,7 +35,8 @@ class TimedText(Message):
 class SpeechMessage(Message):
     """Speak text or clips that arrive in parts; without `id`, describe the contents of a clip.
 
-    Text may contain <sync id="m"/>, SSML and behaviours. A sentence is spoken when it is complete. The speech
+    Text may contain Markdown, stage directions such as *smiles* and [nod], emoji, <sync id="m"/>, SSML and
+    behaviours. A sentence is spoken when it is complete. The speech
     is block `id`, from its first sound to its last. Its parts are the blocks `id.1`, `id.2`, ..., each with
     the behaviour `id`, whose syncs are those of the text: documents refer to them as `id:id:m`, before and
     after they have arrived. Without `close` the block does not end.
@@ -57,6 +58,9 @@ class SpeechMessage(Message):
     type: Literal["speech"]
     id: str | None = Field(None, pattern=r"^[A-Za-z0-9_][A-Za-z0-9_-]{0,63}$")
     append: str | None = Field(None, max_length=MAX_APPEND, description="text with markup, as above")
+    plain: bool = Field(
+        False, description="with its first message: text has no Markdown, stage directions and the like"
+    )
     close: bool = Field(False, description="the end of the text: the rest is spoken, then the block ends")
     composition: Literal["MERGE", "APPEND", "REPLACE"] = Field(
         "APPEND", description="of the block, with its first message"

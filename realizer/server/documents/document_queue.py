@@ -114,7 +114,7 @@ class Submission:
         self.voices: dict[int, str] = {}  # index of a character -> name of its voice
         self.counts = Counter[str]()
         self.pending = PendingBlocks()
-        self.speeches = SpeechStreams(player.manager)
+        self.speeches = SpeechStreams(player.manager, player.context.language)
         self.tts = TtsRequests(player.manager, self.pending)
         self.queue = DocumentQueue(settings)
         self._name = name

@@ -229,8 +229,9 @@ def _faults_of_texts() -> Iterator[None]:
 
 async def _realize(hub: Hub, request: Request) -> Response:
     visitor, query = hub.admit(request), dict(request.query_params)
+    language, plain = query.get("language", hub.settings.language), query.get("plain") == "true"
     with _faults_of_texts():
-        document = document_of(await hub.body(request)).bml
+        document = document_of(await hub.body(request), language=language, plain=plain).bml
     path = await hub.attend(request, hub.renderings.render(document, query, visitor.address))
     entered = contextlib.AsyncExitStack()
     entered.callback(shutil.rmtree, path.parent, ignore_errors=True)
@@ -257,8 +258,9 @@ async def _findings(hub: Hub, body: bytes) -> Iterable[Finding]:
 async def _send_bml(hub: Hub, request: Request) -> Response:
     """Submit the documents or the text in the body to a session, which is opened if it is not there."""
     visitor, name = hub.admit(request), request.path_params["session"]
+    language = hub.settings.language
     with _faults_of_texts():
-        document = document_of(await hub.body(request)).bml
+        document = document_of(await hub.body(request), language=language).bml
     text = document if isinstance(document, str) else _text(document)
     async with hub.joined(_Listener(), name, visitor) as number:
         hub.sessions.receive(number, text)

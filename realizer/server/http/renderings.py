@@ -25,14 +25,14 @@ OPTIONS = {
     "face": NAME, "voice": NAME, "camera": NAME, "light": NAME,
     "background": re.compile("#[0-9a-fA-F]{6}|transparent"), "size": re.compile("[0-9]{1,4}x[0-9]{1,4}"),
     "fps": NUMBER, "at": NUMBER, "seed": re.compile("-?[0-9]{1,18}"),
-    "language": re.compile("[A-Za-z0-9-]{2,35}"), "morphs": NAME,
+    "language": re.compile("[A-Za-z0-9-]{2,35}"), "morphs": NAME, "plain": re.compile("true|false"),
 }  # fmt: skip
 # What their values look like, in words.
 WORDS = {
     **dict.fromkeys(OPTIONS, "a name of letters, digits, - and _"),
     **dict.fromkeys(("fps", "at"), "a number"),
     "background": "a colour such as #d8dde2, or transparent", "size": "WIDTHxHEIGHT, such as 640x480",
-    "seed": "an integer", "language": "a BCP-47 tag, such as nl-NL",
+    "seed": "an integer", "language": "a BCP-47 tag, such as nl-NL", "plain": "true or false",
 }  # fmt: skip
 # Hints for users of the command.
 HINTS = r", or the path of a face folder or a GLB|; (REALIZER_|`realizer ).*"
@@ -94,6 +94,7 @@ class Renderings:
             if not OPTIONS[name].fullmatch(value):
                 words = f"{name}: wanted {WORDS[name]}, got {value[:80]!r}"
                 raise JoinError(HTTPStatus.BAD_REQUEST, words)
+        asked.pop("plain", None)  # of the text, which is a document by now
         drawn = OUTPUTS[suffix].picture_size is not None
         wanted: dict[str, str | None] = {**self._defaults, **asked}
         for name, choice in wanted.items():

@@ -8,6 +8,8 @@ from bml_schema import Block, read
 from realizer.behaviours.registry import VOCABULARY
 from realizer.server.speech.sentence_splitter import SentenceSplitter, is_sentence
 from realizer.spoken_block import Chunk, clip_block, text_block
+from realizer.text.parts import markup
+from realizer.text.stream import TextStream
 
 
 @dataclass(eq=False)
@@ -27,6 +29,7 @@ class SpeechStream:
     connection: int
     composition: str
     chunk: Chunk
+    reader: TextStream | None = None  # of Markdown and the like; None: text has tags only
     splitter: SentenceSplitter = field(default_factory=SentenceSplitter)
     unspoken: deque[tuple[str, bool]] = field(default_factory=deque)
     marks: dict[str, str] = field(default_factory=dict)  # sync -> id of its chunk's block
@@ -47,7 +50,7 @@ class SpeechStream:
 
     def add(self, text: str, clip: str | None) -> None:
         """Add text, and a clip after it."""
-        self.unspoken.extend((piece, False) for piece in self.splitter.feed(text, close=clip is not None))
+        self._split(text, close=clip is not None)
         if clip is not None:
             self.unspoken.append((clip, True))
 
@@ -67,8 +70,13 @@ class SpeechStream:
 
     def close(self) -> None:
         """End the text: its rest is complete."""
-        self.unspoken.extend((piece, False) for piece in self.splitter.feed("", close=True))
+        self._split("", close=True)
         self.is_closed = True
+
+    def _split(self, text: str, *, close: bool) -> None:
+        if self.reader is not None:
+            text = markup(self.reader.feed(text, close=close))
+        self.unspoken.extend((piece, False) for piece in self.splitter.feed(text, close=close))
 
     @property
     def unspoken_length(self) -> int:
@@ -94,7 +102,7 @@ class SpeechStream:
         """Return the block of the next sentence or clip."""
         piece, is_clip = self.unspoken.popleft()
         chunk = self.chunk = replace(self.chunk, number=self.chunk.number + 1, marks=dict(self.marks))
-        block = clip_block(piece, chunk) if is_clip else text_block(piece, chunk)
+        block = clip_block(piece, chunk) if is_clip else text_block(piece, chunk, self._take_warnings())
         speech = next((node for node in block.behaviours if node.id == self.id), None)
         self.marks |= dict.fromkeys(getattr(speech, "marked", ()), block.id)
         self.unplanned.append(block.id)
@@ -102,6 +110,13 @@ class SpeechStream:
         if not is_clip and not is_sentence(piece) and (self.unspoken or not self.is_closed):
             self.partial_chunks.add(block.id)
         return block
+
+    def _take_warnings(self) -> list[str]:
+        """Return what of the text is left out since the last call."""
+        if self.reader is None:
+            return []
+        warnings, self.reader.warnings = self.reader.warnings, []
+        return warnings
 
     # states of blocks ---------------------------------------------------------------------------------
 

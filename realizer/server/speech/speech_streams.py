@@ -14,6 +14,7 @@ from realizer.scheduling.timing import UNKNOWN, Warning
 from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.speech_stream import SpeechStream
 from realizer.spoken_block import Chunk
+from realizer.text.stream import TextStream
 
 # The anticipated end of an open speech is so much later than now, so that it counts as not known.
 OPEN = 2 * UNKNOWN  # s
@@ -37,8 +38,9 @@ class SpeechStreams:
     like any block. Chunk k is block `ID.k` and starts when the speech of the previous one has ended.
     """
 
-    def __init__(self, manager: BlockManager) -> None:
+    def __init__(self, manager: BlockManager, language: str = "en-US") -> None:
         self._manager = manager
+        self._language = language  # of speeches without one
         self._speeches: dict[str, SpeechStream] = {}
 
     def __len__(self) -> int:
@@ -74,7 +76,10 @@ class SpeechStreams:
         speech = self._speeches.get(message.id)
         if speech is None:
             chunk = Chunk(message.id, 0, message.character, message.language)
-            speech = SpeechStream(message.id, connection, message.composition, chunk, last_end=t)
+            reader = None
+            if not message.plain:
+                reader = TextStream(message.language or self._language)
+            speech = SpeechStream(message.id, connection, message.composition, chunk, reader, last_end=t)
             self._speeches[message.id] = speech
             self._anticipate(speech, t + OPEN, t)
         elif speech.is_finished:

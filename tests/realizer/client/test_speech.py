@@ -303,3 +303,14 @@ def test_speech_with_the_id_of_an_open_one_continues_that() -> None:
             assert await second.ended() == await first.ended()
 
     serving(test)
+
+
+def test_speak_reads_a_text_as_people_mean_it_and_returns_its_end() -> None:
+    async def test(url: str) -> None:
+        async with connect(url) as client:
+            end = await client.speak("**Well** [nod] it costs $5.", id="s")
+            assert (end.id, end.status) == ("s:end", "DONE")
+            done = await client.speak("*Hi*", plain=True)
+            assert done.status == "DONE"
+
+    serving(test)

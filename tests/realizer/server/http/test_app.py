@@ -174,7 +174,7 @@ def test_app_closes_a_websocket_that_fails(app, monkeypatch, caplog) -> None:
 def test_app_says_when_to_try_again(app, monkeypatch) -> None:
     for status, retry in ((503, True), (429, True), (503, False), (400, True)):
 
-        def refuse(*_: object, code: int = status, again: bool = retry) -> None:
+        def refuse(*_: object, code: int = status, again: bool = retry, **__: object) -> None:
             raise JoinError(code, "no", retry=again)
 
         monkeypatch.setattr("realizer.server.http.app.document_of", refuse)

@@ -7,6 +7,7 @@ import pytest
 from bml_schema import AudioFile, Speech, write
 from realizer.server.speech.speech_stream import SpeechStream
 from realizer.spoken_block import Chunk
+from realizer.text.stream import TextStream
 
 
 def turn(text: str = "", *, close: bool = False) -> SpeechStream:
@@ -89,3 +90,18 @@ def test_next_chunk_knows_the_syncs_of_earlier_chunks() -> None:
     speech = turn('See <sync id="m"/>this. Nod <head lexeme="NOD" start="turn:m"/>now. ')
     speech.next_chunk()
     assert 'start="turn.1:turn:m"' in write(speech.next_chunk())
+
+
+def test_add_reads_markdown_and_marks_that_are_cut_anywhere() -> None:
+    speech = SpeechStream("turn", 1, "MERGE", Chunk("turn", 0), TextStream())
+    for token in ("**Ye", "s** [n", "od] it", " costs $1", "2.50.\n", "```\nx", "\n```\nDo", "ne."):
+        speech.add(token, None)
+    speech.close()
+    first, second = speech.next_chunk(), speech.next_chunk()
+    words = " ".join(str(first.behaviours[0].text).split())
+    assert words == "Yes it costs twelve dollars and fifty cents."
+    assert [type(node).__name__ for node in first.behaviours] == ["Speech", "Head"]
+    assert [problem.text for block in (first, second) for problem in block.problems] == [
+        "a block of code is not spoken"
+    ]
+    assert "Done." in write(second)
