@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.rows import each_row
+
 CODE = '''
 from pathlib import Path
 from bml_schema.node_schema import node
@@ -121,6 +123,24 @@ def test_plugins_of_the_documentation_and_the_example_have_different_names() -> 
     example = tomllib.loads((ROOT / "examples" / "plugin" / "pyproject.toml").read_text("utf-8"))["project"]
     for group, rows in PROJECT["entry-points"].items():
         assert not rows.keys() & example["entry-points"].get(group, {}).keys()
+
+
+MODULES = ("realization", "playback.player", "pipeline", "outputs", "behaviours.registry", "offline")
+
+
+@each_row("module", MODULES)
+def test_plugins_may_import_the_result_whatever_is_imported_first(site: Path, module: str) -> None:
+    code = f"import realizer.{module}; from realizer.behaviours.registry import KINDS; print(*KINDS)"
+    path = os.pathsep.join(p for p in (os.environ.get("PYTHONPATH"), str(site)) if p)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+        cwd=ROOT,
+        check=True,
+    )
+    assert "{urn:mine}sneer" in done.stdout.split(), done.stderr
 
 
 def test_plugins_bring_a_command(site: Path) -> None:

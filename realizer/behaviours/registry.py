@@ -4,7 +4,6 @@ import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import cache
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -78,14 +77,19 @@ class _Kinds(Mapping[str, BehaviourKind]):
     """Clark tag of an element -> its BehaviourKind. A plug-in cannot replace our elements."""
 
     def __init__(self) -> None:
-        tags = {local(tag): tag for tag in SCHEMA}
         self._kinds: dict[str, BehaviourKind] = {}
         self._families: dict[str, str] = {}  # tag -> its family, which is imported on first use
+
+    def _find_all(self) -> None:
+        """Find the families at the first use: a plug-in may import what imports this module."""
+        if self._families:
+            return
+        tags = {local(tag): tag for tag in SCHEMA}
+        known = {name: [tags[e] for e in words.split() if e in tags] for name, words in ELEMENTS.items()}
+        whole = [name for name, words in ELEMENTS.items() if len(known[name]) == len(words.split())]
+        self._families = {tag: name for name in whole for tag in known[name]}
         for name in FAMILIES:
-            elements = ELEMENTS.get(name, "").split()
-            if elements and tags.keys() >= set(elements):
-                self._families |= dict.fromkeys([tags[element] for element in elements], name)
-            else:
+            if name not in whole:
                 self._import(name)
 
     def _import(self, name: str) -> None:
@@ -95,22 +99,37 @@ class _Kinds(Mapping[str, BehaviourKind]):
                     self._kinds.setdefault(kind.tag, kind if name in ELEMENTS else guarded(kind, name))
 
     def __getitem__(self, tag: str) -> BehaviourKind:
+        self._find_all()
         if tag not in self._kinds and tag in self._families:
             self._import(self._families[tag])
         return self._kinds[tag]
 
     def __iter__(self) -> Iterator[str]:
+        self._find_all()
         return iter({**self._families, **self._kinds})
 
     def __len__(self) -> int:
-        return len({**self._families, **self._kinds})
+        return sum(1 for _ in self)
 
-    def __contains__(self, tag: object) -> bool:  # without an import
+    def __contains__(self, tag: object) -> bool:  # without an import of its family
+        self._find_all()
         return tag in self._families or tag in self._kinds
 
 
+class _Vocabulary(Mapping[str, type[Any]]):
+    """Clark tag of an element -> its node class, for the parser."""
+
+    def __getitem__(self, tag: str) -> type[Any]:
+        if tag in SCHEMA and tag in KINDS:
+            return SCHEMA[tag]
+        return KINDS[tag].node
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(KINDS)
+
+    def __len__(self) -> int:
+        return len(KINDS)
+
+
 KINDS: Mapping[str, BehaviourKind] = _Kinds()
-# Clark tag of an element -> its node class, for the parser.
-VOCABULARY: Mapping[str, type[Any]] = MappingProxyType(
-    {tag: SCHEMA[tag] if tag in SCHEMA else KINDS[tag].node for tag in KINDS}
-)
+VOCABULARY: Mapping[str, type[Any]] = _Vocabulary()
