@@ -175,7 +175,6 @@ class Block:
         unknown_attributes: attributes this version does not define, by Clark name.
         problems: what was dropped while parsing; not part of ==.
         places: behaviour or constraint id -> line and path; not part of ==.
-        speaks_after: starts when the speech of all these blocks is over; in no document, not part of ==.
         behaviours: all, in document order, with those inside <required>.
         constraints: all, in document order, with those inside <required>.
         required: ids of the behaviours inside <required>.
@@ -197,7 +196,6 @@ class Block:
     unknown_attributes: Mapping[str, str] = field(default_factory=dict, hash=False)
     problems: tuple[Problem, ...] = field(default=(), compare=False)
     places: Mapping[str, Place] = field(default_factory=dict, compare=False, repr=False)
-    speaks_after: tuple[str, ...] = field(default=(), compare=False, repr=False)
     behaviours: tuple[Behaviour, ...] = field(init=False, compare=False, repr=False)
     constraints: tuple[Constraint, ...] = field(init=False, compare=False, repr=False)
     required: frozenset[str] = field(init=False, compare=False, repr=False)

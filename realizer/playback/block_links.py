@@ -11,7 +11,7 @@ from bml_schema import Block, SyncRef
 from realizer.core.similar import did_you_mean, similar
 from realizer.playback.active_block import ActiveBlock, BlockMoment, Dependency
 from realizer.playback.anticipation import anticipators_of
-from realizer.playback.references import external_refs
+from realizer.playback.references import external_refs, speaks_after
 from realizer.playback.resources import ResourceClaim
 from realizer.scheduling import Member
 from realizer.scheduling.timing import UNKNOWN, Schedule
@@ -47,7 +47,7 @@ def dependencies(
 
 def spoken_before(block: Block, alive: Iterable[ActiveBlock]) -> list[ActiveBlock]:
     """Return the blocks whose speech a block continues."""
-    return [p for p in alive if p.block.id in block.speaks_after]
+    return [p for p in alive if p.block.id in speaks_after(block)]
 
 
 def followers(block: Block) -> list[tuple[str, BlockMoment]]:

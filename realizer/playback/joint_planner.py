@@ -14,6 +14,7 @@ from realizer.playback.block_links import affected_blocks, members
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_planner import plan as plan_block
 from realizer.playback.block_store import BlockStore
+from realizer.playback.references import speaks_after
 from realizer.playback.resources import ResourceClaim, after_interrupts, claims, conflicts, interrupts
 from realizer.scheduling import schedule_together
 from realizer.scheduling.timing import Schedule
@@ -117,7 +118,7 @@ class JointPlanner:
         for playing, schedule in zip(blocks, schedules, strict=True):
             at = replace(schedule, start=playing.start)
             active = self._blocks.active()
-            later = (p for p in playing.followers if playing.block.id in p.block.speaks_after)
+            later = (p for p in playing.followers if playing.block.id in speaks_after(p.block))
             existing = block_links.existing_claims(playing.character, inf, active, [*blocks, *later])
             if conflicts(claims(playing.block, at, self._kinds, playing.context), existing):
                 return True

@@ -1,10 +1,29 @@
-"""The sync references of a block: collection and replacement."""
+"""What a block names in other blocks: sync references, and the speech that it continues."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import field, fields, replace
+from typing import Self
 
 from bml_schema import Behaviour, Block, Constraint, Speech, Synchronize, SyncRef
+from bml_schema.node_schema import node
 from realizer.core import work
+
+
+@node
+class Continuation(Block):
+    """A block whose speech continues that of other blocks: it starts when theirs is over."""
+
+    speaks_after: tuple[str, ...] = field(default=(), compare=False, repr=False)
+
+    @classmethod
+    def of(cls, block: Block, speaks_after: Iterable[str]) -> Self:
+        values = {f.name: getattr(block, f.name) for f in fields(Block) if f.init}
+        return cls(**values, speaks_after=tuple(speaks_after))
+
+
+def speaks_after(block: Block) -> tuple[str, ...]:
+    """Return the ids of the blocks whose speech a block continues."""
+    return block.speaks_after if isinstance(block, Continuation) else ()
 
 
 def external_refs(block: Block) -> tuple[SyncRef, ...]:

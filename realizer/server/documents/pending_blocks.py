@@ -14,7 +14,7 @@ from bml_schema import Block, ParameterValueChange
 from realizer.core import work
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.playback.block_manager import BlockManager
-from realizer.playback.references import references
+from realizer.playback.references import references, speaks_after
 from realizer.scheduling.timing import Warning
 from realizer.server.session.effects import Speak
 from realizer.server.speech.long_text import LongText, spoken_length, trim_final_pause
@@ -61,7 +61,7 @@ class PendingBlock:
         """The ids of the blocks whose sync points, ends or parameters it names."""
         block, refs = self.block, (ref.block for ref in references(self.block))
         changes = (n.target[0] for n in block.behaviours if isinstance(n, ParameterValueChange))
-        return frozenset((*refs, *changes, *block.append_after, *block.chunk_after, *block.speaks_after))
+        return frozenset((*refs, *changes, *block.append_after, *block.chunk_after, *speaks_after(block)))
 
     def precedes(self, id: str) -> bool:
         """Return whether it names a block in any way, which must not be there when this one is planned."""

@@ -8,7 +8,7 @@ from itertools import chain
 from bml_schema import Block, BlockProgress, Feedback, SyncRef
 from realizer.core.similar import similar
 from realizer.playback.block_manager import BlockManager
-from realizer.playback.references import references, with_references
+from realizer.playback.references import Continuation, references, with_references
 from realizer.protocol.messages.speech import SpeechMessage
 from realizer.scheduling.timing import UNKNOWN, Warning
 from realizer.server.session.control_fields import FieldError
@@ -177,11 +177,8 @@ class SpeechStreams:
             return with_references(block, self._chunk_reference) if has_syncs else block
         own = self._manager.blocks.find(speech.id)
         waits = own.dependencies if own is not None and own.is_waiting else ()
-        return replace(
-            block,
-            append_after=tuple(wait.block.block.id for wait in waits),
-            speaks_after=tuple(id for id in speech.open_chunks if id != block.id),
-        )
+        linked = replace(block, append_after=tuple(wait.block.block.id for wait in waits))
+        return Continuation.of(linked, (id for id in speech.open_chunks if id != block.id))
 
     def is_streaming(self, block: Block) -> bool:
         """Whether a block speaks part of a sentence that the next chunk continues."""

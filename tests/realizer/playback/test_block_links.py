@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +27,7 @@ from realizer.playback.block_links import (
 from realizer.playback.block_planner import plan
 from realizer.playback.block_states import BlockEvent, State
 from realizer.playback.player import Player
+from realizer.playback.references import Continuation
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Phoneme, Utterance
 
@@ -101,7 +101,7 @@ def test_dependencies_by_list_are_of_any_character_and_known() -> None:
 
 def test_dependencies_on_a_speech_leave_out_what_moves_the_face() -> None:
     first = alive("a", start=1.0)
-    (wait,) = dependencies(replace(block("x"), speaks_after=("a", "nobody")), 0, 2, [first])
+    (wait,) = dependencies(Continuation.of(block("x"), ("a", "nobody")), 0, 2, [first])
     assert wait.until == first.start < first.end
     later = alive("b", waits=[wait], number=2)
     appended = dependencies(block("y", 'composition="APPEND"'), 0, 3, [first, later])
