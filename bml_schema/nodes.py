@@ -23,6 +23,8 @@ NAMESPACES = {"bml": CORE, "ext": EXTENSIONS, "bmla": BMLA, "bmlt": BMLT, "reali
 XML = "http://www.w3.org/XML/1998/namespace"
 LANGUAGE = f"{{{XML}}}lang"
 SSML = "application/ssml+xml"  # type of descriptions
+# Type of descriptions with the times of a recorded speech: <realizer:recorded> with marks, words and visemes.
+RECORDED = "application/x-recorded-speech"
 COMPOSITIONS = ("MERGE", "APPEND", "REPLACE")
 
 

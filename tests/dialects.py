@@ -52,6 +52,9 @@ name the dialect. One warning a document, of the type `NOT_BML_1_0`, says what w
 - **Times of programs.** In any document, points of the behaviour itself may be named without its id
   (`end="start+1"`), and seconds may have a unit (`500ms`) or a negative exponent (`1e-05`), with one warning
   a document.
+- **Recorded lines.** `<sync time>` in a speech, `<file ref>` in its description, and `<lips viseme>` and
+  `<curves>` (`au_12_left`, pitch, yaw and roll of head and eyes in degrees, blinks) beside it, as VHBuilder
+  and NVBG write them, are played. Without the sound file the voice speaks at these times.
 - **Output.** What is read is BML 1.0: `realizer schedule --bml` and `bml_schema.write` write it.
 
 Independently of dialects, without a warning: words of closed lists may be in any case (`side="left"`), a
@@ -168,7 +171,9 @@ def sample(row: Row) -> str:
     given = {}
     if row.attribute and row.value != MISSING:
         value = row.value.replace("?*", "_1").replace("*", "1" if "AU" in row.value else "")
-        value = {"*": "SMILE" if element != "head" else "TILT", "*:*": "s:end"}.get(row.value, value)
+        value = {"*": "SMILE" if element != "head" else "TILT", "*:*": "s:end", "*_*": "45_left"}.get(
+            row.value, value
+        )
         given[row.attribute.replace("*", "0")] = value or VALUES.get(row.attribute, "1")
     if row.element == "*" and not row.attribute:
         given["start"] = "after(s:end)"
@@ -179,7 +184,8 @@ def sample(row: Row) -> str:
     shaped = (
         drafted and row.attribute not in ("shape", "lexeme") and (row.attribute, row.value) != ("type", "*")
     )
-    needs = "" if row.value == MISSING or drafted else NEEDS.get(element, "")
+    alone = row.value == MISSING or drafted or row.becomes.endswith("@eyes")
+    needs = "" if alone else NEEDS.get(element, "")
     made = {*given, *re.findall(r"\w+", row.becomes)} | ({"lexeme"} if row.becomes in LEXEMES else set())
     needs = " ".join(n for n in re.findall(r'\S+=".*?"', needs) if n.partition("=")[0] not in made)
     text = "".join(f" {n}={quoteattr(v)}" for n, v in given.items())

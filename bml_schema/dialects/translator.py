@@ -9,6 +9,7 @@ from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES
 from bml_schema.dialects.intentions import show_intentions
+from bml_schema.dialects.recorded_lines import read_recorded_lines
 from bml_schema.dialects.speech_text import translate_speech
 from bml_schema.dialects.sync_points import POINTS, SyncPoints
 from bml_schema.dialects.table import Report, Row, table
@@ -33,6 +34,7 @@ def translate(root: etree._Element, wrapper: str, block_ids: Iterator[str], fml:
     if space not in ("", CORE, *DRAFTS):
         return Report()
     translation = _Translation(root)
+    read_recorded_lines(root, translation.apply)
     translation.run()
     if not (translation.applied or wrapper or space in DRAFTS):
         return Report()
@@ -139,12 +141,13 @@ class _Translation:
         if name == "speech":
             translate_speech(element, self.apply, words=self.in_dialect)
         translate_reference(element, name, self.apply)
-        own = self.table.elements.get(key) or self.table.elements.get(name)
+        own, tag = self.table.elements.get(key) or self.table.elements.get(name), element.tag
         if stays and own is not None and own.becomes == "-":
             return
         if not self._attributes(element, name, key, stays):
             return
-        if own is not None and own.becomes and not self._translate_element(element, own):
+        stayed = element.tag == tag  # what an attribute says of the element comes first
+        if own is not None and own.becomes and stayed and not self._translate_element(element, own):
             return
         renamed, _ = self._name(element)
         if renamed != name and not self._attributes(element, renamed, stays=stays):
@@ -271,7 +274,8 @@ class _Translation:
         made = []
         for element in self.timed():
             id = element.get("id", "").strip()
-            if self._kind(element) == "constraint" or str(element.tag)[1:].startswith(tuple(_OURS)):
+            ours = id and str(element.tag)[1:].startswith(tuple(_OURS))
+            if self._kind(element) == "constraint" or ours:
                 continue
             if not id or id in seen:
                 element.set("id", self._free_id(element))

@@ -93,6 +93,21 @@ def au(element: etree._Element, value: str) -> Attributes:
     return {"au": value.strip()[2:].strip(" _")}
 
 
+def au_side(element: etree._Element, value: str) -> Attributes:
+    number, _, side = value.strip().removeprefix("au_").partition("_")
+    return {"au": number, "side": side.upper()}
+
+
+def eyes(element: etree._Element, value: str) -> Attributes | None:
+    """How eyes move from now on; a saccade with a direction is one movement, whatever its mode."""
+    if not {"direction", "offsetDirection"}.isdisjoint(element.keys()):
+        for name in ("mode", "finish"):
+            element.attrib.pop(name, "")
+        return None
+    modes = {"listen": "LISTENING", "think": "THINKING"}
+    return {"eyes": next((eyes for mode, eyes in modes.items() if value.lower().startswith(mode)), "WAITING")}
+
+
 def language_tag(name: str) -> str:
     """Return the BCP-47 tag of a language, or ""."""
     name = name.strip()
@@ -101,5 +116,6 @@ def language_tag(name: str) -> str:
 
 
 FUNCTIONS: Final[Mapping[str, Callable[[etree._Element, str], Attributes | None]]] = {
-    f.__name__: f for f in (amount, repeats, toss, parameterized, orient, direction, joints, saccade, au)
+    f.__name__: f
+    for f in (amount, repeats, toss, parameterized, orient, direction, joints, saccade, au, au_side, eyes)
 }

@@ -4,7 +4,7 @@ import os
 import re
 from collections import OrderedDict
 from collections.abc import Callable
-from itertools import islice
+from itertools import islice, product
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import unquote, urlsplit
@@ -18,6 +18,7 @@ T = TypeVar("T")
 MAX_BYTES = 64 * 2**20
 MAX_NAMES = 1000  # of a folder that are searched for a similar name
 MAX_CACHED = 8  # files
+ENDS = (".wav", ".mp3", ".ogg", ".flac")  # of sounds that are named without a suffix
 
 _cache: OrderedDict[tuple[Path | None, str, Any], tuple[tuple[int, int], Any]] = OrderedDict()
 
@@ -78,7 +79,8 @@ def media_file(name: str, context: PlanningContext) -> Path:
     """Return the file that a document names, inside `context.media`.
 
     Names are relative to the folder, with "/" or, in old documents, "\\". A file: URL and a path with a drive
-    letter are paths on another machine: the longest end of it that exists in the folder is used.
+    letter are paths on another machine: the longest end of it that exists in the folder is used. Those of
+    recorded lines have no suffix.
 
     Raises:
         MediaError: no folder, a name that leads elsewhere, or no such file.
@@ -87,9 +89,10 @@ def media_file(name: str, context: PlanningContext) -> Path:
         raise MediaError("wanted a media folder (--media DIR), which files are read from, got none")
     elsewhere, parts = _parts(name)
     folder = context.media.resolve()
-    for first in range(len(parts) if elsewhere else 1):
+    ends = ("", *ENDS) if "." not in parts[-1] else ("",)
+    for first, end in product(range(len(parts) if elsewhere else 1), ends):
         try:
-            path = folder.joinpath(*parts[first:]).resolve()
+            path = folder.joinpath(*parts[first:-1], parts[-1] + end).resolve()
             inside, is_file = path.is_relative_to(folder), path.is_file()
         except (OSError, RuntimeError, ValueError):  # a name too long, a circle of links, a null byte
             continue

@@ -14,6 +14,7 @@ from realizer.behaviours.kind import BehaviourKind, Fault, PlanningContext, clai
 from realizer.core.array_types import Float64
 from realizer.core.errors import RealizerError
 from realizer.scheduling.timing import Timing
+from realizer.speech.recorded.given_times import given_times, with_times
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
 # An attribute of <speech>: sentences about what of a text is not in its words.
@@ -40,14 +41,16 @@ def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | No
     A description with an audio file replaces the voice. The text is then in another description, or in the
     sound clip; without text, the lips follow the sound alone.
     """
-    recording = _recording(node, context)
+    recording, given = _recording(node, context), given_times(node)
     spoken = _spoken_content(node)
-    if spoken is None and recording is not None:
-        spoken = SpokenContent(escape(recording.text or ""), ())
+    if spoken is None and (recording is not None or given is not None):
+        spoken = SpokenContent(escape((recording.text if recording else None) or ""), ())
     if spoken is None or len(spoken.ssml) > MAX_TEXT:
         return None
     language = spoken.language or context.language
-    return SpeechRequest(spoken.ssml, spoken.marks, language=language, recording=recording)
+    if recording is not None and given is not None:
+        recording, given = with_times(recording, given), None
+    return SpeechRequest(spoken.ssml, spoken.marks, language=language, recording=recording, given=given)
 
 
 def timing(node: Speech, context: PlanningContext) -> Timing:
@@ -63,6 +66,8 @@ def timing(node: Speech, context: PlanningContext) -> Timing:
         for name, time in utterance.marks.items()
         if name not in Speech.sync_points
     }
+    if (given := given_times(node)) is not None:
+        measured |= {name: min(time, utterance.duration) for name, time in given.marks.items()}
     # The time of a sync that the voice does not report is estimated from its position in the text.
     estimated = {name: part * utterance.duration for name, part in _places(node).items()}
     times = estimated | measured
@@ -131,7 +136,8 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         got = f'a description of type "{unread[0].type}" with {unread[0].content.strip()[:80]!r}'
         wanted = f'wanted <bmlt:audiofile fileName="clip:ID"/> in its description, got {got}'
         faults = (Fault("CANNOT_CREATE_BEHAVIOR", wanted),)
-    if spoken is None and name is not None and not faults:
+    given = given_times(node)
+    if spoken is None and ((name is not None and not faults) or given is not None):
         spoken = SpokenContent("", ())
     if spoken is None and faults:
         words = f"speech: {faults[0].text}"
@@ -146,6 +152,7 @@ def check(node: Speech, context: PlanningContext) -> tuple[Fault, ...]:
         unsaid = context.utterances[node.id].warnings if node.id in context.utterances else ()
         if left_out := node.unknown_attributes.get(UNSAID):
             unsaid = (left_out, *unsaid)
+        unsaid = (*unsaid, *(given.warnings if given is not None else ()))
         if unsaid:
             words = f"speech: {'; '.join(unsaid)}"
             faults = (*faults, Fault("CUSTOM_ATTRIBUTE_NOT_SUPPORTED", words))

@@ -27,6 +27,15 @@ def speak_to_length(voice: Voice, request: SpeechRequest) -> Utterance:
         from realizer.speech.recorded.recorded_speech import utterance_of
 
         return with_volumes(request, utterance_of(request, request.recording))
+    if (given := request.given) is not None:
+        from realizer.speech.recorded.given_times import at_given_times
+
+        said = Utterance(0.0, (), (), {})
+        if request.ssml.strip():
+            said = _synthesize(voice, replace(request, seconds=given.duration, given=None))
+            marks = {name: time for name, time in given.marks.items() if name in said.marks}
+            said = stretched(said, {**marks, "end": given.duration})
+        return with_volumes(request, at_given_times(said, given))
     return with_volumes(request, _synthesize(voice, request))
 
 

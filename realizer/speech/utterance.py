@@ -46,6 +46,8 @@ class SpeechRequest:
     seconds: float | None = None
     # a recording of the text, which is aligned (`speech.align`) instead of synthesizing speech
     recording: Recording | None = None
+    # the times of a recording that is not there, at which the voice speaks
+    given: GivenTimes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,30 @@ class Phoneme:
     ipa: str  # "" for a pause
     stress: int = 0  # 0 none, 1 primary, 2 secondary
     volume: float = 1.0  # requested factor of the amplitude; 1 is the voice's own
+
+
+@dataclass(frozen=True, eq=False)
+class GivenTimes:
+    """Times of a recording that its document gives, in seconds from its start; what is not given is empty."""
+
+    marks: Mapping[str, float]
+    words: tuple[Word, ...] = ()
+    phonemes: tuple[Phoneme, ...] = ()  # of visemes; without gaps
+    unknown: tuple[str, ...] = ()  # names of visemes that have no mouth shape
+
+    @property
+    def last(self) -> float:
+        """When the last viseme ends."""
+        return self.phonemes[-1].end if self.phonemes else 0.0
+
+    @property
+    def duration(self) -> float:
+        """When all of them have ended; never nothing."""
+        return max((*self.marks.values(), *(word.end for word in self.words), self.last, 0.1))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        return (f"visemes without a mouth shape: {', '.join(self.unknown)}",) if self.unknown else ()
 
 
 @dataclass(frozen=True, eq=False)

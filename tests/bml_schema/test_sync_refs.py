@@ -186,7 +186,8 @@ def test_respelled_knows_no_own_points_without_a_behaviour() -> None:
 
 def test_times_of_programs_cause_one_warning_a_document() -> None:
     faces = "".join(
-        f'<faceLexeme id="f{k}" lexeme="SMILE" start="{k}" end="start+1"/><head id="h{k}" lexeme="NOD" end="2s"/>'
+        f'<faceLexeme id="f{k}" lexeme="SMILE" start="{k}" end="start+1"/>'
+        f'<head id="h{k}" lexeme="NOD" end="2s"/>'
         for k in range(5)
     )
     block = parse(f'<bml xmlns="{CORE}" id="b">{faces}</bml>')

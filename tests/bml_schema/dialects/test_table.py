@@ -112,5 +112,6 @@ def test_report_says_what_was_read_how() -> None:
     assert problem.text == (
         'read as SmartBody\'s BML: <head type="NOD"> as lexeme=NOD, '
         "<head repeats> as repetition: rounded and at least 1, "
-        "without <head velocity>, <saccade mode>"
+        "<saccade mode> as realizer:idle the eyes of a listener or thinker or idle ones, "
+        "without <head velocity>"
     )

@@ -188,8 +188,9 @@ def test_translate_reads_a_dialect_in_the_namespace_of_bml() -> None:
 
 def test_translate_keeps_a_document_of_bml_1_0_what_it_is() -> None:
     block = parse(
-        f'<bml xmlns="{CORE}" id="b"><head id="h" type="NOD"/><gaze id="g" target="x" offsetDirection="UP_LEFT"/>'
-        '<emit id="e"/><event id="v" message="x"/><head id="n" lexeme="Neutral"/><head lexeme="NOD"/></bml>'
+        f'<bml xmlns="{CORE}" id="b"><head id="h" type="NOD"/>'
+        '<gaze id="g" target="x" offsetDirection="UP_LEFT"/><emit id="e"/>'
+        '<event id="v" message="x"/><head id="n" lexeme="Neutral"/><head lexeme="NOD"/></bml>'
     )
     assert [b.id for b in block.behaviours] == ["h", "n"]
     assert {(p.id, p.type) for p in block.problems} == {
