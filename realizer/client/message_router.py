@@ -160,7 +160,7 @@ class Router:
 MAX_WAITING = 1_000
 # The session clock is estimated from the messages of so many seconds.
 MEMORY = 5.0  # s
-LATE = 0.1  # s; of frames that are due for longer only the newest one is taken
+LATE = 0.2  # s; of frames that are due for longer only the newest one is taken
 GAP = 0.5  # s without a message, in which the program stood still: what it knew of the clock is no older
 
 
@@ -177,6 +177,7 @@ class Playout:
 
     def __init__(self, ahead: float) -> None:
         self.left_out = 0  # frames that were long past
+        self.received = 0  # messages
         self._ahead = ahead
         self._heard = -math.inf  # when the last message arrived
         self._frames: deque[WireFrame[Any]] = deque(maxlen=MAX_WAITING)
@@ -191,6 +192,7 @@ class Playout:
             now: when it arrived, in seconds on any clock that never jumps.
         """
         frames = message.rows()
+        self.received += 1
         while self._frames and self._frames[-1].frame >= message.frame:
             self._frames.pop()
         self._frames.extend(frame for frame in frames if frame.frame >= self._next)
@@ -212,6 +214,10 @@ class Playout:
         self._next = 0
         self._heard = -math.inf
 
+    def is_late(self, now: float) -> bool:
+        """Return whether the next frame is long past."""
+        return self.next_due < now - LATE
+
     @property
     def next_due(self) -> float:
         """When the next frame is due, on the clock of `receive`; infinity without frames."""
@@ -221,7 +227,7 @@ class Playout:
         """Return the next frame if it is due; of frames long past, the newest one."""
         if self.next_due > now:
             return None
-        if self.next_due < now - LATE:
+        if self.is_late(now):
             while len(self._frames) > 1 and self._frames[1].time + self._offsets[0][1] <= now:
                 self._frames.popleft()
                 self.left_out += 1

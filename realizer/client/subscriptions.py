@@ -13,6 +13,7 @@ from realizer.client.errors import ClientError, ClosedError
 from realizer.client.message_router import Arrivals, Playout, Receiver
 
 T = TypeVar("T")
+CATCH_UP = 0.01  # s
 
 
 async def play_out(
@@ -26,16 +27,25 @@ async def play_out(
     with contextlib.suppress(ClosedError):
         async with _subscribed(connection, stream, playout, {**options, "ahead": ahead}):
             while True:
+                await _catch_up(playout)
                 before = playout.left_out
-                while (frame := playout.take(time.monotonic())) is not None:
+                if (frame := playout.take(time.monotonic())) is not None:
                     connection.router.left_out[stream] += playout.left_out - before
-                    before = playout.left_out
                     yield frame
+                    continue
                 due = playout.next_due
                 pause = None if due == math.inf else due - time.monotonic()
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(pause):
                         await connection.wait_for(lambda due=due: playout.next_due != due)  # type: ignore[misc]
+
+
+async def _catch_up(playout: Playout) -> None:
+    """While the next frame is long past, wait for newer ones, which may have arrived and are not read."""
+    seen = -1
+    while playout.is_late(time.monotonic()) and seen != playout.received:
+        seen = playout.received
+        await asyncio.sleep(CATCH_UP)
 
 
 async def take_subscribed(

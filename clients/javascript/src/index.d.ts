@@ -70,6 +70,29 @@ export type Pcm = Int16Array | Float32Array | ArrayBuffer | Uint8Array;
 /** [seconds, text], [start, end, text] or an object. */
 export type Timed = readonly [number, string] | readonly [number, number, string] | { start: number; end?: number; text: string };
 
+/** A warning about a document. */
+export interface Warning {
+  /** Of a block, or block:behaviour. */
+  id: string;
+  type: string;
+  text: string;
+}
+
+/** The feedback of the end of a block. */
+export interface BlockEnd extends Element {
+  warnings: Warning[];
+  /** False if nothing was heard or moved though something was asked for. */
+  shown: boolean;
+}
+
+/** A word, when it is spoken; `time` is on the session clock. */
+export interface SpokenWord {
+  start: number;
+  end?: number;
+  text: string;
+  time: number;
+}
+
 export interface SpeechOptions {
   language?: string;
   character?: string;
@@ -91,6 +114,7 @@ export interface SayOptions extends SpeechOptions {
   /** In IPA. */
   phonemes?: readonly Timed[];
   visemes?: readonly Timed[];
+  onword?: (word: SpokenWord) => void;
   visemeSet?: "oculus" | "mpeg4" | "sapi" | "polly";
 }
 
@@ -101,7 +125,7 @@ declare abstract class OpenSpeech {
   readonly progress: { start: number | null; points: Record<string, number> };
   close(): void;
   stop(): void;
-  ended(): Promise<Element>;
+  ended(): Promise<BlockEnd>;
 }
 
 /** A speech whose text comes in parts. */
@@ -112,6 +136,7 @@ export class Speech extends OpenSpeech {
 
 /** A speech whose sound comes in parts. */
 export class Voice extends OpenSpeech {
+  onword: (word: SpokenWord) => void;
   write(pcm: Pcm): void;
   words(words: readonly Timed[]): void;
 }
@@ -126,20 +151,22 @@ export class Realizer {
   onopen: () => void;
   onlost: (error: RealizerError | null) => void;
   onfeedback: (element: Element, seq: number) => void;
+  onwarning: (warning: Warning) => void;
   onreply: (message: { type: string; [field: string]: unknown }) => void;
   onframe: (frame: Frame) => void;
   connect(): Promise<void>;
   close(): void;
   send(message: string | Uint8Array): void;
   ask(message: { type: string; [field: string]: unknown }): Promise<Record<string, unknown> | null>;
-  play(bml: string): Promise<Element>;
-  ended(block: string): Promise<Element>;
-  say(sound: Pcm, options?: SayOptions): Promise<Element>;
-  speak(text: string, options?: TextOptions): Promise<Element>;
+  play(bml: string): Promise<BlockEnd>;
+  ended(block: string): Promise<BlockEnd>;
+  say(sound: Pcm, options?: SayOptions): Promise<BlockEnd>;
+  speak(text: string, options?: TextOptions): Promise<BlockEnd>;
   speech(id?: string, options?: Omit<TextOptions, "id">): Speech;
   stop(...blocks: string[]): Promise<null>;
-  voice(options: SpeechOptions & { rate: number }): Voice;
-  subscribe(stream: string, options?: SubscribeOptions, take?: (frame: Frame) => void): Promise<StreamInfo>;
+  voice(options: SpeechOptions & { rate: number; onword?: (word: SpokenWord) => void }): Voice;
+  readonly leftOut: Readonly<Record<string, number>>;
+  subscribe(stream: StreamName | "feedback", options?: SubscribeOptions, take?: (frame: Frame) => void): Promise<StreamInfo>;
   unsubscribe(stream: string, character?: string, view?: string): void;
   faps(options?: SubscribeOptions, take?: (frame: FapFrame) => void): Promise<StreamInfo>;
   aus(options?: SubscribeOptions, take?: (frame: AuFrame) => void): Promise<StreamInfo>;

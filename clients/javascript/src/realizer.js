@@ -8,8 +8,10 @@ import { Waiters, blocksOf } from "./waiters.js";
 const AHEAD = 0.2; // s; frames that are sent so long before their time survive most delays
 export const BMLA = "http://www.asap-project.org/bmla"; // namespace of the states of blocks
 const OWN = "urn:bml-realizer:1";
-const MARK = /^ask-\d+$/; // ids of pings behind messages without an answer
-const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s
+const MARK = /^(ask-\d+|alive)$/; // ids of pings behind messages without an answer, and of those to a silent service
+const RETRY = [0.3, 0.6, 1.2, 2.5, 5]; // s, times 0.5 to 1.5, so that the clients of a service do not return all at once
+const PATIENCE = 10; // s for the first message of a connection
+const SILENCE = 15; // s without a message, after which the service is asked; it is lost after twice as long without an answer
 const nothing = () => {};
 const timeOf = (element) => Number(element.getAttribute("globalTime"));
 const over = () => new RealizerError("the connection was closed");
@@ -31,6 +33,8 @@ const keyOf = ({ stream, character, view }) => JSON.stringify([stream, character
  *   onlost(error)               disconnected; a new connection is tried, unless there is an error: then the service refuses
  *                               the token, the session or the version
  *   onfeedback(element, seq)    BML feedback, as an XML element
+ *   onwarning(warning)          a warning about a document, or a block of which nothing was heard or moved though something
+ *                               was asked for: { id, type, text }. By default it is written to the console
  *   onreply(message)            every JSON message that is not a frame: welcome, subscribed, state, error, ...
  *   onframe(frame)              every frame of every stream, see `frameOf`; its `streamInfo` has the fields of the last
  *                               `subscribed` or `changed` of its stream, such as face, scale and offset of a mesh
@@ -39,18 +43,26 @@ export class Realizer {
   onopen = nothing;
   onlost = nothing;
   onfeedback = nothing;
+  onwarning = ({ id, type, text }) => console.warn(`realizer: ${id}: ${type ? `${type}: ` : ""}${text}`);
   onreply = nothing;
   onframe = nothing;
   /** seq of the newest feedback; null before the first. */
   seen = null;
   /** The current WebSocket. */
   socket = null;
+  #current = null; // the WebSocket, until it is closed here
+  #opening = null; // the promise of `connect`
+  #fail = nothing; // rejects it
+  #retry = null; // timer of the next try
+  #watch = null; // timer that looks whether the service is silent
+  #token;
   #tries = 0;
   #closed = false;
   #asked = []; // { message, mark, isSent, resolve, reject } of requests without an answer; mark: id of the ping behind it
   #marks = 0;
   // stream, character and view -> { message, take, streamInfo: fields of `subscribed`, playout: with `ahead` }
   #streams = new Map();
+  #leftOut = {}; // stream -> count
   #unsent = []; // documents to send once the connection is open
   #waiters = new Waiters();
   #connection = null; // its number in `welcome`
@@ -68,7 +80,7 @@ export class Realizer {
     this.url = new URL(url ?? new URL("ws", import.meta.url));
     if (this.url.protocol === "file:") throw new TypeError("wanted the url of a service, such as ws://127.0.0.1:8765/ws, got none");
     if (this.url.protocol.startsWith("http")) this.url.protocol = this.url.protocol.replace("http", "ws");
-    if (token) this.url.searchParams.set("token", token);
+    this.#token = token ? { token } : {}; // in `hello`, because addresses are logged
     this.session = session ?? `js-${crypto.getRandomValues(new Uint32Array(2)).join("-")}`;
   }
 
@@ -83,30 +95,53 @@ export class Realizer {
    *   follow, unless the service refuses the token (the code of the error is "token"), the session or the version
    */
   connect() {
+    if (this.#current?.readyState <= WebSocket.OPEN) return this.#opening;
+    clearTimeout(this.#retry);
     this.#closed = false;
     this.#refusal = null;
     this.#over = over;
-    const opened = new Promise((resolve, reject) => this.#open(resolve, reject));
-    opened.catch(nothing);
-    return opened;
+    globalThis.addEventListener?.("online", this.#online);
+    this.#opening = new Promise((resolve, reject) => this.#open(resolve, reject));
+    this.#opening.catch(nothing);
+    return this.#opening;
   }
 
+  /** Try again at once, because there is a network again. */
+  #online = () => {
+    if (this.#retry === null || this.#closed) return;
+    clearTimeout(this.#retry);
+    this.#open();
+  };
+
   #open(resolve = nothing, reject = nothing) {
+    this.#retry = null;
+    this.#fail = reject;
     const url = new URL(this.url);
     url.searchParams.set("session", this.session);
     if (this.seen !== null) url.searchParams.set("seen", this.seen);
-    const socket = (this.socket = new WebSocket(url));
+    const socket = (this.socket = this.#current = new WebSocket(url));
     let wasOpen = false;
+    let heard = performance.now();
     socket.binaryType = "arraybuffer";
+    const patience = setTimeout(() => this.#drop(socket), 1000 * PATIENCE);
+    clearInterval(this.#watch);
+    this.#watch = setInterval(() => {
+      const silent = (performance.now() - heard) / 1000;
+      if (silent > 3 * SILENCE) this.#drop(socket);
+      else if (silent > SILENCE) this.#post({ type: "ping", id: "alive" });
+    }, 1000 * SILENCE);
+    this.#watch.unref?.();
     this.#welcomed = () => {
+      clearTimeout(patience);
       this.#welcomed = nothing;
       this.#tries = 0;
       resolve();
       this.onopen();
     };
     socket.onopen = () => {
+      if (this.#current !== socket) return; // an older one, after `close` and `connect`
       wasOpen = true;
-      this.#post({ type: "hello", version: VERSION });
+      this.#post({ type: "hello", version: VERSION, ...this.#token });
       for (const { message, playout } of this.#streams.values()) {
         playout?.reset();
         this.#post(message);
@@ -114,9 +149,16 @@ export class Realizer {
       for (const asked of this.#asked) if (asked.message.type !== "subscribe") this.#request(asked);
       for (const text of this.#unsent.splice(0)) this.send(text);
     };
-    socket.onmessage = (event) => this.#receive(event.data);
+    socket.onmessage = (event) => {
+      if (this.#current !== socket) return;
+      heard = performance.now();
+      this.#receive(event.data);
+    };
     socket.onerror = nothing; // `onclose` follows
     socket.onclose = ({ code, reason }) => {
+      clearTimeout(patience);
+      if (this.#current !== socket) return;
+      clearInterval(this.#watch);
       // What comes later waits for the next connection, and is not interrupted.
       if (wasOpen) this.#waiters.interrupt();
       const lost = this.#asked.filter(({ mark, isSent }) => mark && isSent);
@@ -128,13 +170,27 @@ export class Realizer {
       if (refusal) this.#end(() => refusal);
       this.onlost(refusal);
       if (refusal) return;
-      setTimeout(() => this.#closed || this.#open(), 1000 * RETRY[Math.min(this.#tries++, RETRY.length - 1)]);
+      const pause = RETRY[Math.min(this.#tries++, RETRY.length - 1)] * (0.5 + Math.random());
+      this.#retry = setTimeout(() => this.#closed || this.#open(), 1000 * pause);
     };
+  }
+
+  /** Give up a connection that does not answer, as if it had been lost. */
+  #drop(socket) {
+    socket.onclose({ code: 1006, reason: "the service does not answer" });
+    socket.onclose = socket.onmessage = socket.onopen = nothing;
+    socket.close();
   }
 
   /** Close the connection; pending promises and those of later calls are rejected. */
   close() {
+    this.#current = null; // what still comes of the socket is ignored
+    clearTimeout(this.#retry);
+    clearInterval(this.#watch);
+    globalThis.removeEventListener?.("online", this.#online);
+    this.#retry = null;
     this.socket?.close();
+    this.#fail(over());
     this.#end(over);
   }
 
@@ -188,7 +244,8 @@ export class Realizer {
       take(frame);
       this.onframe(frame);
     };
-    const playout = options.ahead > 0 ? new Playout(options.ahead, pass) : null;
+    const leaveOut = (count) => (this.#leftOut[stream] = (this.#leftOut[stream] ?? 0) + count);
+    const playout = options.ahead > 0 ? new Playout(options.ahead, pass, leaveOut) : null;
     this.#streams.get(key)?.playout?.reset();
     this.#streams.set(key, { message, take, streamInfo: { index: 0 }, playout });
     const answer = this.ask(message);
@@ -228,6 +285,11 @@ export class Realizer {
     return this.subscribe("audio", options, take);
   }
 
+  /** Stream -> number of frames that were long past and left out, because the page stood still or was too slow. */
+  get leftOut() {
+    return { ...this.#leftOut };
+  }
+
   /** End a stream; `view` is the name of a video's view. */
   unsubscribe(stream, character, view) {
     const key = keyOf({ stream, character, view });
@@ -238,7 +300,8 @@ export class Realizer {
 
   /**
    * Send BML as soon as the connection is open, and wait for the end of its last block.
-   * @returns {Promise<Element>} the feedback of the end; rejects if the block is refused
+   * @returns {Promise<Element>} the feedback of the end, with `warnings`, [{ id, type, text }, ...], about the block, and
+   *   `shown`: false if nothing was heard or moved though something was asked for. Rejects if the block is refused
    */
   play(text) {
     const isControl = /^[\s\ufeff]*\{/.test(text);
@@ -263,11 +326,12 @@ export class Realizer {
    * @param {Int16Array|Float32Array|ArrayBuffer|Uint8Array} sound PCM if there is a `rate`, else a WAV, FLAC, MP3, Ogg
    *   or WebM file
    * @param {object} [options] rate: samples a second of PCM. text: the words as plain text. words: [[seconds, word],
-   *   ...]. phonemes, visemes: [[start, end, name], ...]. Without any, lips are read from the sound. visemeSet,
+   *   ...] or [{ start, end, text }, ...]. phonemes, visemes: [[start, end, name], ...]. Without any, lips are read from
+   *   the sound. onword: called with each word, and its `time` on the session clock, when it is spoken. visemeSet,
    *   language, character, composition: as in the message `speech`
-   * @returns {Promise<Element>} the feedback of the end; rejects if the sound is refused
+   * @returns {Promise<Element>} the feedback of the end, as of `play`; rejects if the sound is refused
    */
-  say(sound, { rate, text, words, phonemes, visemes, visemeSet, ...opening } = {}) {
+  say(sound, { rate, text, words, phonemes, visemes, visemeSet, onword, ...opening } = {}) {
     let pcm, description;
     try {
       if (rate !== undefined) pcm = samplesOf(sound);
@@ -282,7 +346,8 @@ export class Realizer {
     }
     if (text !== undefined) description.text = text;
     if (visemeSet !== undefined) description.viseme_set = visemeSet;
-    const voice = this.#voice(rate ?? 1, opening);
+    const voice = this.#voice(rate ?? 1, opening, onword);
+    voice.expect(description.words ?? []);
     voice.clip(pcm, rate ?? 0, description);
     voice.close();
     return voice.ended();
@@ -319,17 +384,18 @@ export class Realizer {
 
   /**
    * Open a speech of any other voice whose sound comes in parts.
-   * @param {object} options rate: samples a second. id of the speech and of its block, language, character,
-   *   composition: as in the message `speech`
+   * @param {object} options rate: samples a second. onword: as of `say`. id of the speech and of its block, language,
+   *   character, composition: as in the message `speech`
    * @returns {Voice}
    */
-  voice({ rate, ...opening } = {}) {
-    return this.#voice(rate, opening);
+  voice({ rate, onword, ...opening } = {}) {
+    return this.#voice(rate, opening, onword);
   }
 
-  #voice(rate, { id = madeId(), ...opening }) {
+  #voice(rate, { id = madeId(), ...opening }, onword = nothing) {
     rateOf(rate); // before anything waits for the speech
     const voice = new Voice(rate, id, opening, (message) => this.#later(message), this.#ended(id, () => voice));
+    voice.onword = onword;
     return voice;
   }
 
@@ -422,14 +488,20 @@ export class Realizer {
         const isNew = block.getAttributeNS(BMLA, "status") === "IN_PREP";
         this.#waiters[isNew ? "acknowledge" : "plan"](block.getAttribute("id"));
       }
-    } else if (element.localName === "blockProgress" && id.endsWith(":end")) this.#waiters.end(id.slice(0, -4), element);
-    else if (element.localName === "blockProgress") this.#waiters.start(id.slice(0, -6), timeOf(element));
+    } else if (element.localName === "blockProgress" && id.endsWith(":end")) {
+      element.shown = element.getAttributeNS(OWN, "shown") !== "false";
+      if (!element.shown) this.onwarning({ id: id.slice(0, -4), type: "", text: "nothing of it was heard or moved" });
+      this.#waiters.end(id.slice(0, -4), element);
+    } else if (element.localName === "blockProgress") this.#waiters.start(id.slice(0, -6), timeOf(element));
     else if (element.localName === "syncPointProgress") {
       const [, speech, behaviour, sync] = id.match(/^([^:]*)\.[^.:]*:([^:]*):(.*)$/) ?? []; // in blocks speech.1, speech.2, ...
       if (behaviour === speech) this.#waiters.reach(speech, sync, timeOf(element));
     }
     else if (element.localName === "warningFeedback") {
+      const warning = { id, type: element.getAttribute("type"), text: element.textContent };
+      this.onwarning(warning);
       const sender = element.getAttributeNS(OWN, "inUseFor"); // of the block; other clients get the warning too
+      if (!sender || Number(sender) === this.#connection) this.#waiters.warn(warning);
       if (!sender || Number(sender) === this.#connection) this.#waiters.refuse(id, element.textContent, Boolean(sender));
     }
     this.onfeedback(element, seq);

@@ -14,6 +14,10 @@ export class Voice extends OpenSpeech {
   #sent = 0; // samples that are
   #words = []; // { start, text } of the speech that are not sent
   #timed = false; // whether there were any
+  #given = []; // all words, and how many of them were spoken
+  #spoken = 0;
+  /** Called with each word, and its `time` on the session clock, when it is spoken. */
+  onword = () => {};
   #clips = 0;
   #closed = false;
 
@@ -42,8 +46,20 @@ export class Voice extends OpenSpeech {
    * Add words: [[seconds from the start of the speech, word], ...], in order.
    */
   words(words) {
-    this.#words.push(...timed("words", words));
+    const added = timed("words", words);
+    this.#words.push(...added);
+    this.expect(added);
     this.#timed ||= this.#words.length > 0;
+  }
+
+  /** Take words of which each is reported when it is spoken. */
+  expect(words) {
+    this.#given.push(...words);
+  }
+
+  /** Take a sync point: the known words of a clip are `word-1`, `word-2`, ... */
+  reach(sync, time) {
+    if (/^word-\d+$/.test(sync) && this.#spoken < this.#given.length) this.onword({ ...this.#given[this.#spoken++], time });
   }
 
   /** End the speech; what was written is spoken. Closing again does nothing. */

@@ -86,7 +86,7 @@ export class Waiters {
    * @returns {Promise<Element>} the feedback of its end
    */
   add(block) {
-    const end = new Promise((resolve, reject) => this.#all.push({ ...block, resolve, reject }));
+    const end = new Promise((resolve, reject) => this.#all.push({ warnings: [], ...block, resolve, reject }));
     end.catch(nothing); // need not be handled
     return end;
   }
@@ -113,8 +113,15 @@ export class Waiters {
 
   end(id, element) {
     const ended = this.#reached(id);
-    for (const { resolve } of ended) resolve(element);
+    for (const { resolve, warnings } of ended) resolve(Object.assign(element, { warnings }));
     this.#remove(ended);
+  }
+
+  /** Keep a warning, { id, type, text }, for the block that it is about, or the speech that the block is a part of. */
+  warn(warning) {
+    const [block] = warning.id.split(":");
+    const found = this.#reached(block);
+    for (const { warnings } of found.length ? found : this.#reached(block.replace(/\.[^.]*$/, ""))) warnings.push(warning);
   }
 
   /**

@@ -284,3 +284,72 @@ test("play rejects a block whose session has ended meanwhile", async () => {
   await assert.rejects(end, { code: "gap" });
   await realizer.play('<bml id="go" composition="REPLACE"><head id="n" lexeme="NOD"/></bml>');
 });
+
+test("connect twice, or after close, leaves one connection", async () => {
+  const client = new Realizer({ url, session: "again" });
+  const first = client.connect();
+  assert.equal(client.connect(), first);
+  client.close();
+  await assert.rejects(first, /was closed/);
+  await client.connect();
+  await client.connect();
+  let sockets = 0;
+  client.onframe = () => {};
+  ({ connections: sockets } = await client.ask({ type: "state" }));
+  assert.equal(sockets, 1);
+  client.close();
+  let lost = 0;
+  client.onlost = () => (lost += 1);
+  await client.connect();
+  await client.play(NOD("again"));
+  assert.equal(lost, 0);
+  client.close();
+});
+
+test("play and say return warnings, and tell once that nothing was heard or moved", async () => {
+  const client = new Realizer({ url });
+  const logged = [];
+  client.onwarning = (warning) => logged.push(warning);
+  await client.connect();
+  const end = await client.play("<bml id='b'><head id='n' lexeme='NODD'/></bml>");
+  assert.deepEqual([end.shown, end.warnings.map(({ id }) => id)], [false, ["b:n"]]);
+  assert.match(end.warnings[0].text, /did you mean NOD/);
+  assert.deepEqual(logged.map(({ id }) => id), ["b:n", "b"]);
+  const nod = await client.play(NOD("c"));
+  assert.deepEqual([nod.shown, nod.warnings], [true, []]);
+  const said = await client.say(new Int16Array(RATE / 4), { rate: RATE });
+  assert.equal(said.shown, false);
+  const late = await client.say(tone(0.5), { rate: RATE, words: [[100, "mama"], [300, "papa"]] });
+  assert.match(late.warnings[0].text, /taken as milliseconds/);
+  client.close();
+});
+
+test("warnings are written to the console by default", async (t) => {
+  const warn = t.mock.method(console, "warn", () => {});
+  const client = new Realizer({ url });
+  await client.connect();
+  await client.play("<bml id='b'><head id='n' lexeme='NODD'/><head id='m' lexeme='NOD'/></bml>");
+  assert.equal(warn.mock.callCount(), 1);
+  assert.match(warn.mock.calls[0].arguments[0], /^realizer: b:n: /);
+  client.close();
+});
+
+test("say and voice report each word when it is spoken", async () => {
+  const words = [{ start: 0.1, text: "mama" }, { start: 0.5, end: 0.8, text: "papa" }];
+  const spoken = [];
+  await realizer.say(tone(1), { rate: RATE, words, onword: (word) => spoken.push(word) });
+  assert.deepEqual(spoken.map(({ text }) => text), ["mama", "papa"]);
+  assert.ok(Math.abs(spoken[1].time - spoken[0].time - 0.4) < 1e-3);
+  const voice = realizer.voice({ rate: RATE, onword: (word) => spoken.push(word) });
+  voice.words(words);
+  for (let k = 0; k < 5; k++) voice.write(tone(0.2));
+  voice.close();
+  await voice.ended();
+  assert.deepEqual(spoken.slice(2).map(({ text }) => text), ["mama", "papa"]);
+});
+
+test("errors reach the request that caused them", async () => {
+  const asked = [{ type: "stopp" }, { type: "ping", x: 1 }, { type: "ping" }, { type: "stop", blocks: ["nobody"] }, { type: "state" }];
+  const answers = await Promise.allSettled(asked.map((message) => realizer.ask(message)));
+  assert.deepEqual(answers.map(({ status }) => status), ["rejected", "rejected", "fulfilled", "rejected", "fulfilled"]);
+});

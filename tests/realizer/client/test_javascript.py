@@ -30,12 +30,17 @@ const realizer = new Realizer({ url: "ws://127.0.0.1:8765/ws" });
 await realizer.connect();
 await realizer.faps({ fps: 25 }, (frame) => { const values: Int32Array = frame.values(); values.length; });
 const words: Timed[] = [[0, "a"], [0.1, 0.2, "b"]];
-const end: Element = await realizer.say(new Int16Array(2), { rate: 16000, words });
+const onword = ({ time }: { time: number }) => time.toFixed();
+const end: Element = await realizer.say(new Int16Array(2), { rate: 16000, words, onword });
 end.getAttribute("id");
+const { warnings, shown } = await realizer.play("<bml id='b'/>");
+realizer.onwarning = ({ id, text }) => console.log(id, text, warnings.length, shown, realizer.leftOut.arkit);
 const speech = realizer.speech("turn", { composition: "REPLACE" });
 await speech.append("Hello <sync id='m'/>there.");
 (await speech.until("m")).toFixed();
 await realizer.stop(speech.id);
+// @ts-expect-error: there is no such stream
+realizer.subscribe("nosuch");
 // @ts-expect-error: a voice needs its rate
 realizer.voice({});
 """

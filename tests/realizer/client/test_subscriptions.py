@@ -37,7 +37,9 @@ def test_client_yields_frames_without_those_taken_back(ahead: float) -> None:
                     await client.send('<bml id="b"><head id="n" lexeme="NOD"/></bml>')
                 if len(numbers) == 30:
                     break
-            assert numbers == list(range(numbers[0], numbers[0] + 30))
+            assert numbers == sorted(numbers)
+            # On a busy machine some are long past.
+            assert numbers[-1] - numbers[0] + 1 - len(numbers) == client.left_out.get("fap", 0)
             timely = {}
             async for frame in other.frames("fap"):
                 assert isinstance(frame, WireFrame)
