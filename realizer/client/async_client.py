@@ -174,7 +174,7 @@ class Client:
         self._router.waiters.add(voice.progress)
         return voice
 
-    async def speak(self, text: str, **opening: Unpack[TextOptions]) -> BlockProgress:
+    async def speak(self, text: str, **opening: Unpack[TextOptions]) -> BlockEnd:
         """Speak a text and return its end; `said` are the words that were spoken, if it was cut off.
 
         Markdown, stage directions, emoji and numbers are read as people mean them; SSML and behaviours stay
