@@ -6,6 +6,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from PIL import Image, UnidentifiedImageError
 
 from realizer.animation.axis import au_row
 from realizer.animation.frames import AUFrames
@@ -45,8 +46,6 @@ class Likeness:
 
 def read_picture(path: Path) -> UInt8:
     """Read a picture as (h, w, 3), transparent parts in black; raises UnknownPictureError."""
-    from PIL import Image, UnidentifiedImageError
-
     try:
         with Image.open(path) as image:
             picture = image.convert("RGBA")
@@ -132,6 +131,4 @@ def _brightness(picture: UInt8) -> Float32:
 
 
 def _resized(picture: UInt8, size: tuple[int, int]) -> UInt8:
-    from PIL import Image
-
     return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX))

@@ -7,6 +7,8 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
+from scipy.optimize import nnls
 
 from realizer.animation.arkit import MILLIMETRES
 from realizer.animation.axis import au_row
@@ -29,8 +31,6 @@ def explain(faces: Float64, shapes: Float64, most: int, least_gain: float) -> tu
         most: the largest number of rows.
         least_gain: the least share of the squared displacement that one more row explains.
     """
-    from scipy.optimize import nnls
-
     total = float(np.sum(faces**2))
     lengths = np.maximum(np.linalg.norm(shapes, axis=1), 1e-9)
     chosen: list[int] = []
@@ -182,8 +182,6 @@ def picture(learnt: FaceMap, cell: int = 28) -> UInt8:
 
 def save(folder: Path, learnt: FaceMap) -> None:
     """Write the map, its picture, and the names of its neurons, which can be edited."""
-    from PIL import Image
-
     arrays = {name: getattr(learnt, name) for name in ARRAYS}
     with replacing(folder / MAP) as path, path.open("wb") as file:
         np.savez_compressed(file, **arrays)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from PIL import Image
 
 from realizer.core.errors import FaceError, TableError
 from realizer.core.similar import did_you_mean, similar
@@ -185,8 +186,6 @@ def _field_faults(folder: Path, face: Face) -> list[str]:
 
 def _picture_faults(folder: Path, files: Mapping[str, bytes]) -> list[str]:
     """Return the maps that are no pictures, or damaged."""
-    from PIL import Image
-
     faults = []
     for name, raw in files.items():
         try:

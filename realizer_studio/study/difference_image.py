@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from PIL import Image, ImageFilter
 
 from realizer.core.array_types import Float32, UInt8
 
@@ -24,8 +25,6 @@ def ramp(amount: Float32) -> Float32:
 
 def faint(neutral: UInt8) -> Float32:
     """Return the background (h, w, 3), sRGB 0..255, of a difference image, from pixels (h, w, 4)."""
-    from PIL import Image, ImageFilter
-
     share = neutral[..., 3:] / np.float32(255)
     lit = np.concatenate([neutral[..., :3] * share, neutral[..., 3:]], axis=2)
     soft = Image.fromarray(np.rint(lit).astype(np.uint8), "RGBA")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from realizer.animation.axis import au_row, fap
 from realizer.animation.frames import AUFrames
@@ -94,8 +95,6 @@ def differs(one: UInt8, other: UInt8) -> bool:
 
 def webp(picture: UInt8) -> bytes:
     """Return a picture (h, w, 3 or 4) as WebP without metadata."""
-    from PIL import Image
-
     buffer = io.BytesIO()
     image = Image.fromarray(opaque(picture) if picture.shape[2] == 4 else picture)
     image.thumbnail((LARGEST, LARGEST))

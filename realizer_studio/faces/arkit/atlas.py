@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from PIL import Image
+from scipy.ndimage import distance_transform_edt
 
 from realizer.core.array_types import Bool, Float64
 from realizer.core.colours import linear, srgb
@@ -56,8 +58,6 @@ def make_atlas(gltf: Gltf, surface: Surface, ranges: Mapping[str, tuple[int, int
     Raises:
         FaceError: an image is missing or too large.
     """
-    from scipy.ndimage import distance_transform_edt
-
     if not any(surface.materials[k].textures for k in np.unique(surface.material)):
         return None
     # Materials that differ only by name and roughness share a patch.
@@ -207,8 +207,6 @@ def _painted(gltf: Gltf, material: Material, box: Float64, size: tuple[int, int]
 
 def _resampled(pixels: Any, box: Float64, size: tuple[int, int], wrap: tuple[int, int]) -> Any:
     """Return the part of a texture in a box of u and v as (height, width, channels)."""
-    from PIL import Image
-
     height, width = pixels.shape[:2]
     low, high = box[:2] * (width, height), box[2:] * (width, height)
     first, step, axes = np.floor(low), np.ones(2), []
@@ -234,8 +232,6 @@ def _resampled(pixels: Any, box: Float64, size: tuple[int, int], wrap: tuple[int
 
 
 def _webp(picture: Any, quality: int) -> bytes:
-    from PIL import Image
-
     out = io.BytesIO()
     Image.fromarray(picture).save(out, "WEBP", quality=quality, method=4, exact=True)
     return out.getvalue()

@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
+from PIL import Image, UnidentifiedImageError
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
@@ -244,8 +245,6 @@ class Gltf:
         return self._pictures[image]
 
     def _decoded(self, image: int) -> Any:
-        from PIL import Image, UnidentifiedImageError
-
         found = self.item("images", image)
         name = f"images[{image}] {found.get('name') or found.get('uri', '')[:40]}".rstrip()
         if "bufferView" not in found and not found.get("uri"):

@@ -9,6 +9,7 @@ from functools import cache, partial
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.colours import linear, srgb
@@ -172,8 +173,6 @@ def cut(surface: Surface, height: Float64) -> Surface:
     """Return the surface where `height` (n,) is above zero, cut along the line of zeros."""
     if (height > 0).all():
         return surface
-    import scipy.sparse as sp
-
     from realizer_studio.faces.parts import SLIVER, Submesh
 
     n = len(surface.vertices)

@@ -6,6 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import edge_graph, half_edges, neighbour_mean
@@ -61,9 +63,6 @@ def _surface_distance(
     graph: Any, at: Float64, positions: Mapping[str, Float64], contours: Any
 ) -> tuple[Float64, Int32]:
     """Return the distance (n,) over the skin to the contours in metres, and their nearest vertex."""
-    from scipy.sparse.csgraph import dijkstra
-    from scipy.spatial import cKDTree
-
     t = np.linspace(0, 1, STEPS)[:, None]
     line = np.concatenate(
         [positions[a] * (1 - t) + positions[b] * t for contour in contours for a, b in pairwise(contour)]

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
@@ -133,8 +134,6 @@ def _turn(
 
 def _snapped(turn: Float64) -> Float64 | None:
     """Return the nearest of the 24 axis-aligned rotations, or None if none is near."""
-    from scipy.spatial.transform import Rotation
-
     aligned = np.rint(Rotation.create_group("O").as_matrix()) + 0.0  # without negative zeros
     best: Float64 = max(aligned, key=lambda m: float(np.trace(m @ turn.T)))
     return best if min((best * turn).sum(axis=1)) > MIN_COSINE else None

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64
 from realizer.face.features import Point
@@ -64,8 +65,6 @@ def _size(surface: Surface, *names: str) -> Any:
 
 def _inner_lips(skin: Surface, points: Mapping[str, Point], first: int) -> dict[str, int]:
     """Return the points of the inner contours, where the regions of the two lips' shapes touch in front."""
-    from scipy.spatial import cKDTree
-
     up = _size(skin, "mouthUpperUpLeft", "mouthUpperUpRight")
     down = _size(skin, "mouthLowerDownLeft", "mouthLowerDownRight")
     if up is None or down is None or not up.any() or not down.any():

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
@@ -234,8 +235,6 @@ def _fit_motion(
 
 def _head(face: Face) -> HeadTurn:
     """Return the smooth step that fits best how the face's vertices follow its head."""
-    from scipy.optimize import least_squares
-
     weight = np.asarray(face.basis["head"], np.float64).ravel()
     at = face.vertices.astype(np.float64)
     chin = float(face.points["2.1"][1])

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
@@ -92,8 +93,6 @@ def _on_base(figure: Figure, face: Face, index: Any) -> tuple[Int32, Float64, Fl
     Returns:
         (n, 3) base vertices, (n, 3) their weights, and the distance of each vertex in metres, (n,).
     """
-    from scipy.spatial import cKDTree
-
     first, last = face.parts["skin"]
     skin = face.vertices[first:last].astype(np.float64)
     skin_triangles = part_triangles(face.triangles, face.parts["skin"])

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from realizer.core.array_types import Float64
 from realizer.face.au.functions import ANGLE, GAUSSIAN, angle, density, direction
@@ -42,8 +43,6 @@ def mirrored_angles() -> tuple[Free, Free]:
 
 def mirrored_gaussians(layout: str) -> Free:
     """Return the map of Gaussians in a layout such as "pc": `p` is a symmetric pair, `c` a central one."""
-    from scipy.linalg import block_diag
-
     pair = np.concatenate([np.eye(GAUSSIAN), np.diag([1.0, -1, 1, 1, 1, -1, 1, -1, 1, 1])])
     middle = np.eye(GAUSSIAN)[:, [0, 2, 3, 4, 6, 8, 9]]
     matrix = block_diag(*(pair if kind == "p" else middle for kind in layout))

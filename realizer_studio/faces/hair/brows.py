@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import flat_cross, vertex_normals
@@ -37,8 +38,6 @@ class Brow:
         Args:
             points: feature points, metres; side: 1 left, -1 right.
         """
-        from scipy.interpolate import PchipInterpolator
-
         a, b, c = (points[k] for k in (("4.1", "4.3", "4.5") if side > 0 else ("4.2", "4.4", "4.6")))
         x = np.abs([a[0] - side * (0.003 - look.brow_gap), (a[0] + b[0]) / 2, b[0], c[0] - side * 0.001])
         arch = look.brow_arch

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.cards import FILE, Cards
@@ -77,8 +78,6 @@ def _lifted(patch: Patch, at: Float64, triangles: Int32) -> Patch:
 
 def _bound_below(patch: Patch, at: Float64) -> Patch:
     """Return the patch with vertices that follow the skin (n, 3) below them instead of their roots' skin."""
-    from scipy.spatial import cKDTree
-
     distance, nearest = (np.asarray(found) for found in cKDTree(at).query(patch.positions, 3))
     shares = 1 / (distance + CLEARANCE)
     return replace(patch, skin=nearest.astype(np.int32), shares=shares / shares.sum(axis=1, keepdims=True))
@@ -157,8 +156,6 @@ def bind(
 
 def _anchors(at: Float64, scalp: Scalp, turns: Float64) -> tuple[Int32, int]:
     """Return four vertices of the skull, and one at the foot of the neck that head rotations do not move."""
-    from scipy.spatial import cKDTree
-
     directions = np.array(ANCHORS)
     turning, static = np.flatnonzero(turns > 0.999), np.flatnonzero(turns < STATIC)
     skull = turning[
@@ -189,7 +186,6 @@ def depths(positions: Float64, at: Float64, triangles: Int32, near: float) -> tu
         (k,) metres, negative in front of the surface, -inf farther than `near` from it; and (k, 3) metres,
         the offset to the nearest point of the surface.
     """
-    from scipy.spatial import cKDTree
     from trimesh import triangles as shapes
 
     angles: Any = shapes.angles

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
@@ -196,8 +197,6 @@ def bind_to_skin(at: Float64, parts: Mapping[str, tuple[int, int]]) -> tuple[Any
 
     The skin's vertices are counted from its first vertex.
     """
-    from scipy.spatial import cKDTree
-
     vertex = np.concatenate([np.zeros(0, int), *(np.arange(*parts[name]) for name in GROWN if name in parts)])
     distance, nearest = cKDTree(at[slice(*parts["skin"])]).query(at[vertex], NEAR)
     weight = 1 / np.maximum(distance, 1e-5)

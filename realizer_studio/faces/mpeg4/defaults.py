@@ -6,6 +6,7 @@ from functools import cache, partial
 from typing import Any, Literal
 
 import numpy as np
+from scipy.sparse.csgraph import dijkstra
 
 from realizer.core.array_types import Bool, Float64, Int32
 from realizer.core.errors import FaceError
@@ -129,7 +130,5 @@ def _graph(vertices: Float64, triangles: Int32, skin: tuple[int, int]) -> Any:
 
 def _surface_distance(graph: Any, at: Float64, targets: list[Float64]) -> Float64:
     """Return each vertex's distance over the skin to the nearest target, (skin,) metres."""
-    from scipy.sparse.csgraph import dijkstra
-
     sources = [int(np.argmin(np.linalg.norm(at - target, axis=1))) for target in targets]
     return np.asarray(dijkstra(graph, directed=False, indices=sources, min_only=True), np.float64)

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import label
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Bool, Float64, Int32
 
@@ -128,8 +130,6 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
     ball = head.radius**2 - (px - centre[0]) ** 2 - (py - centre[1]) ** 2
     front = centre[2] + np.sqrt(np.maximum(ball, 0))
     covered = np.asarray((depth > front) | (ball < 0))
-    from scipy.ndimage import label
-
     regions, _ = label(~covered)
     # The opening of an almost shut eye is below or above the centre of the ball.
     open_ = np.argwhere(regions > 0)
@@ -161,8 +161,6 @@ def _opening(head: HeadGeometry, centre: Float64, side: str) -> dict[str, Float6
 
 def _corners(head: HeadGeometry, found: dict[str, Float64]) -> dict[str, Float64]:
     """Return the corners of the mouth, which are the ends of the line where the lips touch."""
-    from scipy.spatial import cKDTree
-
     if "slit" not in found:
         return {}
     slit = found["slit"]

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer.core.errors import FaceError
@@ -83,9 +85,6 @@ def find_points(
     Raises:
         FaceError: a part is missing, or the eyeballs do not stand side by side.
     """
-    from scipy.interpolate import RBFInterpolator
-    from scipy.spatial import cKDTree
-
     for name in ("skin", "left_eye", "right_eye"):
         if name not in parts:
             raise FaceError(f"parts: wanted {name!r}, got {', '.join(parts) or 'none'}")

@@ -4,6 +4,7 @@ Every field is scaled so that its feature point moves one metre per metre of FAP
 """
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from realizer.core.array_types import Float64
 from realizer.face.basis import JAW_SIN
@@ -136,8 +137,6 @@ def _stations(x: Float64, across: Float64) -> list[Float64]:
 
     The weights are smooth curves, and their slope is 0 at the inner end of the other side's brow.
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     a, b, c = across
     knots = np.array([-a, a, b, c])
     out = []

@@ -7,6 +7,7 @@ corner (1), w from the inner contour (0: FAPs 4-13) to the outer (1: FAPs 51-60)
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Bool, Float64
 from realizer_studio.faces.parts import smooth
@@ -158,8 +159,6 @@ class Lips:
 
     def _extend_outwards(self, figure: Figure, on_ring: Any, inside: Bool) -> None:
         """Set the coordinates of all other vertices to those of the nearest point on the border."""
-        from scipy.spatial import cKDTree
-
         at = figure.at
         ring = np.array(self.rings[BORDER] + self.rings[BORDER][:1])
         # The ring is divided into short segments, so that the coordinates change smoothly.

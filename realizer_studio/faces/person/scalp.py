@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import vertex_normals
@@ -32,8 +33,6 @@ class Scalp:
             line: rows of degrees and metres above the eyes, on the head for which it was drawn.
             rise: rows of degrees and metres that are added to the line.
         """
-        from scipy.spatial import cKDTree
-
         self.at = at
         self.normals = vertex_normals(at, triangles)
         self._line, self._rise = np.array(line, float).T, np.array(rise, float).T

@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.ndimage import gaussian_filter, median_filter
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
@@ -47,8 +50,6 @@ class Observation:
         projected, _ = pose(self.anchors.positions(at))
         if self.view.points is not None:
             return np.tile(np.eye(2), (len(projected), 1, 1)), (self.points - projected) / pose.size
-        from scipy.spatial import cKDTree
-
         nearest = np.clip(cKDTree(self.points).query(projected)[1], 2, len(self.points) - 3)
         tangent = self.points[nearest + 2] - self.points[nearest - 2]
         normal = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1) / np.linalg.norm(tangent, axis=1)[:, None]
@@ -146,8 +147,6 @@ def _profile(side: View, anchors: LandmarkAnchors, at: Float64) -> tuple[Observa
 
 
 def _turned(roll: float) -> Float64:
-    from scipy.spatial.transform import Rotation
-
     turns = Rotation.from_euler("z", roll) * Rotation.from_euler("y", np.pi / 2)
     return np.asarray(turns.as_rotvec())
 
@@ -208,8 +207,6 @@ def outline(image: Image, region: Region) -> Float64:
 
     Each row of the picture is searched from its right edge for the end of the background.
     """
-    from scipy.ndimage import gaussian_filter, median_filter
-
     reach = REACH * region.side
     top, bottom = (int(np.clip(region.y + sign * reach, 0, image.height - 1)) for sign in (-1, 1))
     pixels = np.asarray(image, np.float32)[top : bottom + 1]

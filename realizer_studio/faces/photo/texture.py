@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from realizer.core.array_types import Float32, Float64
 from realizer.core.colours import linear, srgb
@@ -96,8 +97,6 @@ def projected(skin: Skin, observation: Observation, pose: Pose, both: bool) -> P
     Args:
         both: whether it shows both halves of the face; if not, the right half is mirrored to the left.
     """
-    from scipy.ndimage import map_coordinates
-
     at, normals = skin.at.astype(np.float64), skin.normals().astype(np.float64)
     if not both:
         mirror = np.where(at[:, :1] > 0, (-1.0, 1.0, 1.0), 1.0)

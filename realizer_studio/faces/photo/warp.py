@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64
 from realizer.face.reading import read_arrays
@@ -28,9 +30,6 @@ class Warp:
 
     def __call__(self, at: Float64) -> Float64:
         """Return the warped points (n, 3); points far from the face are unchanged."""
-        from scipy.interpolate import RBFInterpolator
-        from scipy.spatial import cKDTree
-
         spline = RBFInterpolator(self.positions, self.moves, kernel="linear", degree=0, smoothing=SMOOTH)
         distance = np.asarray(cKDTree(self.positions).query(at)[0])
         near = np.flatnonzero(distance < FAR)

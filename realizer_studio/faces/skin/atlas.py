@@ -3,6 +3,9 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float64, Int32
 from realizer_studio.faces.parts import Submesh
@@ -51,8 +54,6 @@ def corners(mesh: BaseMesh, patch: Submesh) -> Float64:
 
     A corner outside the island of its triangle gets the coordinates of the nearest vertex of that island.
     """
-    from scipy.spatial import cKDTree
-
     charts, islands = _charts(mesh)
     rest = patch.mix @ mesh.vertices
     each = np.stack([patch.mix @ chart for chart in charts])  # (charts, n, 2), NaN where a vertex is not
@@ -78,9 +79,6 @@ def _charts(mesh: BaseMesh) -> tuple[Float64, Int32]:
     There are three charts for each island: the island without the vertices of its seam along the middle line,
     which have several coordinates, and both of its sides with them.
     """
-    import scipy.sparse as sp
-    from scipy.sparse.csgraph import connected_components
-
     quads, corner = mesh.quads["body"], mesh.corners
     ends = np.concatenate([corner[:, [k, (k + 1) % 4]] for k in range(4)]).T
     count = len(mesh.texture)

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from PIL import Image, ImageDraw
+from scipy.ndimage import gaussian_filter
 
 from realizer.core.array_types import Float32, Float64, UInt8
 from realizer.render.textures import DEPTH
@@ -98,9 +100,6 @@ def _white(x: Float64, y: Float64, out: Float64, tint: dict[str, Float64], seed:
 
 def _vessels(size: int, seed: int) -> Float32:
     """Return the coverage by vessels, (size, size) 0..1: winding lines towards the limbus."""
-    from PIL import Image, ImageDraw
-    from scipy.ndimage import gaussian_filter
-
     rng = np.random.default_rng(seed)
     paper = Image.new("F", (size, size), 0)
     draw = ImageDraw.Draw(paper)

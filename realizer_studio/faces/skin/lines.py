@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Float32, Float64
 from realizer.tables import toml_table
@@ -37,8 +39,6 @@ class Line:
 
     def near(self, at: Any, normals: Any, reach: float) -> tuple[Any, Float64, Any]:
         """Return the points (j,) within reach of the line, with distance and nearest point of the line."""
-        from scipy.spatial import cKDTree
-
         flat = np.stack([at @ self.right, at[:, 1]], 1)
         low, high = self.path.min(axis=0) - reach, self.path.max(axis=0) + reach
         inside = ((flat > low) & (flat < high)).all(axis=1)
@@ -102,8 +102,6 @@ def _course(knots: Float64, offset: float, slant: float) -> tuple[Float64, Float
     Args:
         off: metres between knots and curve; slant: metres by which this grows from end to end.
     """
-    from scipy.interpolate import PchipInterpolator
-
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))]
     where = np.linspace(0, along[-1], max(8, int(along[-1] / STEP)))
     curve = np.asarray(PchipInterpolator(along, knots)(where))

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from realizer.core.array_types import Float32, Float64, UInt8
 from realizer.face.mesh_geometry import vertex_normals
@@ -42,8 +43,6 @@ class SkinMaps:
 
     def write(self, folder: Path) -> None:
         """Write the pictures as WebP."""
-        from PIL import Image
-
         for name, picture in self.pictures.items():
             Image.fromarray(picture).save(folder / f"{name}.webp", quality=QUALITY[name], method=4)
 

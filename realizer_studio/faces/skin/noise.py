@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from realizer.core.array_types import Float32
 
@@ -17,8 +18,6 @@ def noise(at: Any, length: Any, seed: int) -> Float32:
         length: metres between independent values, one number or one for each axis.
         seed: the seed of the values.
     """
-    from scipy.ndimage import map_coordinates
-
     rng = np.random.default_rng(seed)
     values: Any = rng.standard_normal((LATTICE,) * 3).astype(np.float32)
     where: Any = np.asarray(at, np.float32).T / np.reshape(np.asarray(length, np.float32), (-1, 1))

@@ -5,6 +5,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Bool, Float32, Float64
 from realizer.face.mesh_geometry import vertex_normals
@@ -59,10 +62,6 @@ class Skin:
 
     def _bordered(self, ring: Float32) -> Float32:
         """Return positions across the lips with a smooth border of the red instead of the mesh's."""
-        from scipy.interpolate import CubicSpline
-        from scipy.ndimage import gaussian_filter1d
-        from scipy.spatial import cKDTree
-
         at, t = self.person.figure.at, np.arange(RING_SIZE + 1)
         inner, line, outer = (at[self.lips.rings[k]] for k in (BORDER - 1, BORDER, BORDER + 1))
         gap = np.linalg.norm(outer - inner, axis=1, keepdims=True) / 2
@@ -182,8 +181,6 @@ def distance_through(vertices: Float64, normals: Float64, among: Any, full: floa
     Args:
         among: (j,) vertices of the opposite surface; full: metres, the maximum.
     """
-    from scipy.spatial import cKDTree
-
     out = np.full(len(vertices), full)
     near = cKDTree(vertices[among]).query_ball_point(vertices, full)
     for k, found in enumerate(near):

@@ -5,6 +5,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt, gaussian_filter, zoom
+from scipy.spatial import cKDTree
 
 from realizer.core.array_types import Bool, Float32, Float64, Index, Int32
 from realizer.face.mesh_geometry import flat_cross, triangle_normals
@@ -29,8 +31,6 @@ class Texels:
         Args:
             vertices: (n, 3) metres; triangles: (m, 3); corners: (m, 3, 2) texture coordinates, 0..1.
         """
-        from scipy.ndimage import distance_transform_edt
-
         self.size, self._triangles = size, triangles
         self.flat, self.triangle, self.weights = _covered(corners * size - 0.5, size)
         self.at = self.spread(vertices)
@@ -64,8 +64,6 @@ class Texels:
 
     def blurred(self, values: Float32, radius: float) -> Float32:
         """Return values (k,) blurred by a radius in texels, each island separately."""
-        from scipy.ndimage import gaussian_filter
-
         cover = np.zeros((self.size, self.size), np.float32)
         image = cover.copy()
         image.ravel()[self.flat], cover.ravel()[self.flat] = values, 1
@@ -87,8 +85,6 @@ class Texels:
         return positions, np.maximum(self._fine(np.isfinite(positions[..., 0]).astype(np.float32)), 0.05)
 
     def _fine(self, coarse: Float32) -> Float32:
-        from scipy.ndimage import zoom
-
         image = zoom(coarse, COARSE, order=1, grid_mode=True, mode="nearest")
         return np.asarray(image.ravel()[self.flat], np.float32)
 
@@ -125,8 +121,6 @@ class Texels:
             density: (k,) texels per square metre.
             apart: metres, the least distance between two of them.
         """
-        from scipy.spatial import cKDTree
-
         candidates = np.flatnonzero(rng.random(len(density)) < density * self.width**2)
         candidates = rng.permutation(candidates)
         pairs = cKDTree(self.at[candidates]).query_pairs(apart, output_type="ndarray")

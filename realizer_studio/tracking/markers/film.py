@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import ndimage
+from scipy.sparse.csgraph import connected_components
 
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.behaviours.keyframes import document_of
@@ -58,8 +60,6 @@ def blobs(picture: Image, colours: Sequence[Colour], region: Box | None = None) 
 
 def _blob_positions(mask: Bool, *, upper_edge: bool) -> Float64:
     """Return the positions (n, 2) of the blobs of a mask, with those of one marker merged."""
-    from scipy import ndimage
-
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not len(rows):
         return np.zeros((0, 2))
@@ -91,8 +91,6 @@ def _dilated(mask: Bool) -> Bool:
 
 def _groups(middles: Float64) -> Index:
     """Return the number (n,) of each blob's group."""
-    from scipy.sparse.csgraph import connected_components
-
     near = np.linalg.norm(middles[:, None] - middles, axis=-1) < MERGED
     return np.asarray(connected_components(near, directed=False)[1], np.intp)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import Delaunay, QhullError
 
 from realizer.core.array_types import Float64, Index
 from realizer.core.errors import TableError
@@ -100,8 +101,6 @@ def constraints(layout: Layout) -> Index:
     distant others: the point stays on one side of the line through them. They are redundant, because points
     can be missing (7.1.3).
     """
-    from scipy.spatial import Delaunay, QhullError
-
     positions, size = layout.positions, layout.size
     try:
         found = [tuple(map(int, row)) for row in Delaunay(positions).simplices]

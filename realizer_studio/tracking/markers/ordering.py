@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from realizer.core.array_types import Float64, Index
 from realizer_studio.tracking.markers.layout import Layout, broken, constraints
@@ -167,8 +168,6 @@ def _assign(
     expected: Float64, blobs: Float64, colours: Index, radius: float, forbidden: Iterable[tuple[int, int]]
 ) -> Index:
     """Return the row of each point's blob by least squares; a missing point costs `radius` squared."""
-    from scipy.optimize import linear_sum_assignment
-
     count = len(expected)
     cost = np.full((count, len(blobs) + count), NEVER)
     squares = np.square(expected[:, None] - blobs[:, :2]).sum(axis=-1)
