@@ -28,8 +28,8 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer.face.surface import normals
-from realizer_studio.faces.au.fit import table, table_text
 from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
+from realizer_studio.faces.au.unit_fit import table, table_text
 from tests.au_mixers import mix
 
 SHOWN = (1, 4, 6, 9, 10, 12, 15, 18, 27, 43)

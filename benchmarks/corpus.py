@@ -24,9 +24,9 @@ from pathlib import Path
 
 import numpy as np
 
+from realizer_studio.corpus.face_map import learn, template_faps
 from realizer_studio.corpus.films import with_markers
-from realizer_studio.corpus.find import agreement, find
-from realizer_studio.corpus.learn import learn, template_faps
+from realizer_studio.corpus.finder import agreement, find
 from realizer_studio.corpus.recording import Annotation, Recording
 from realizer_studio.tracking.markers.colours import named
 from realizer_studio.tracking.markers.film import MarkerSettings, track_markers

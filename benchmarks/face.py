@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer.tables import read_csv
-from realizer_studio.faces.mpeg4.build import copy_with_zones
 from realizer_studio.faces.mpeg4.fap_scores import FapScore, mean_score, score_faps
+from realizer_studio.faces.mpeg4.zone_build import copy_with_zones
 
 # The scores of other faces (Paul 2010, table 4.5), with FAPs that they lack counted as 0.
 PEERS = {"FaceEditor": 2.60, "Greta": 2.32, "Miraface": 1.96, "Xface": 1.32}

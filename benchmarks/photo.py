@@ -25,7 +25,7 @@ from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer.render.cameras import Framing, camera_for
 from realizer.render.renderer import Renderer
-from realizer_studio.faces.photo.build import build_from_photographs
+from realizer_studio.faces.photo.photo_build import build_from_photographs
 
 SIZE = 1024, 1024
 REST: Mapping[int, float] = {}

@@ -24,8 +24,8 @@ from realizer_studio.analysis.recognise import recogniser
 from realizer_studio.tracking import regressor
 from realizer_studio.tracking.files import mask, unit_columns
 from realizer_studio.tracking.follower import Person, follow
+from realizer_studio.tracking.person_recording import record
 from realizer_studio.tracking.pictures import is_picture, read_pictures
-from realizer_studio.tracking.recording import record
 
 FOUND = 0.2  # intensity from which a unit counts as found
 WORTH = 0.08  # intensity that is printed

@@ -21,10 +21,10 @@ from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from realizer_studio.study.analysis import confusion, matching
 from realizer_studio.study.answers import read_answers
 from realizer_studio.study.items import Item
 from realizer_studio.study.kit import key_of
+from realizer_studio.study.results import confusion, matching
 from tests.studies import key, matches, named, simulated, write
 
 JUDGES, ACCURACIES, SPREADS = (8, 25), (0.5, 0.7, 0.9), (0.0, 0.1)

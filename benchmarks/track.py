@@ -19,8 +19,8 @@ from realizer.animation.axis import AU_NAMES
 from realizer_studio.tracking import regressor
 from realizer_studio.tracking.files import unit_columns
 from realizer_studio.tracking.follower import follow
+from realizer_studio.tracking.person_recording import Recording, record
 from realizer_studio.tracking.pictures import read_pictures
-from realizer_studio.tracking.recording import Recording, record
 from realizer_studio.tracking.regressor import MEASURED_UNITS
 
 # Action units that are shown one after the other, and together as emotions do.

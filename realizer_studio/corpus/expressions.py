@@ -16,7 +16,7 @@ from realizer.tables import action_units, au_to_fap
 from realizer.tables.lexemes import SIDES
 from realizer.tables.templates import PREFIX
 from realizer.tables.timing import gaps
-from realizer_studio.corpus.learn import explain, faps_of, features
+from realizer_studio.corpus.face_map import explain, faps_of, features
 from realizer_studio.corpus.recording import Recording, Segment
 from realizer_studio.corpus.statistics import FEWEST, Study
 
@@ -87,7 +87,7 @@ def found_expressions(study: Study) -> list[Found]:
 
 
 def units_of(face: Float64) -> dict[str, float]:
-    """Return the action units that explain a face (68,) in millimetres, as `learn.features` returns it."""
+    """Return the action units that explain a face (68,) in millimetres, as `face_map.features` returns it."""
     names, unit_faces = _units()
     chosen, weights = explain(face[None], unit_faces, MOST, LEAST_GAIN)
     pairs = sorted(zip(chosen, weights[0].tolist(), strict=True))

@@ -10,7 +10,7 @@ from realizer.core.array_types import Float64
 from realizer_studio.corpus.recording import META, CorpusError, Recording, read_parts, read_recording
 from realizer_studio.tracking.follower import Person
 from realizer_studio.tracking.markers.film import Markers, faps_of
-from realizer_studio.tracking.recording import rate_of, record
+from realizer_studio.tracking.person_recording import rate_of, record
 
 SUFFIXES = (".mp4", ".m4v", ".mov", ".webm", ".mkv", ".avi", ".mpg", ".mpeg", ".mts")
 

@@ -23,7 +23,7 @@ from realizer.tables.arkit_names import shapes
 from realizer.tables.lexemes import SIDES
 from realizer_studio.analysis.faps_from_points import COLUMNS as POINT_COLUMNS
 from realizer_studio.analysis.faps_from_points import bridge, faps_from_points, read_points
-from realizer_studio.corpus.learn import faps_of
+from realizer_studio.corpus.face_map import faps_of
 from realizer_studio.corpus.recording import (
     COLUMNS,
     LABELS,

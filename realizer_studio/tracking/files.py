@@ -18,7 +18,7 @@ from realizer.outputs.csv_table import csv_text
 from realizer.outputs.fap_text import encode
 from realizer.tables import by_number, faps
 from realizer.tables.cooccurrence import rules
-from realizer_studio.tracking.recording import Recording
+from realizer_studio.tracking.person_recording import Recording
 from realizer_studio.tracking.regressor import MEASURED_FAPS, MEASURED_UNITS, Measured
 
 HEAD = (48, 49, 50)

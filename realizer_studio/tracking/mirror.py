@@ -16,7 +16,7 @@ from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.files import HEAD, mask, unit_columns
 from realizer_studio.tracking.landmarks import MIN_PRESENCE, NEW_PRESENCE, Landmarks, landmarks
 from realizer_studio.tracking.network import TrackingError
-from realizer_studio.tracking.recording import QUIET
+from realizer_studio.tracking.person_recording import QUIET
 from realizer_studio.tracking.regressor import Measured, components, measure
 
 REMEMBERED = 300  # pictures from which the face at rest is estimated

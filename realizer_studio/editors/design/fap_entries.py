@@ -16,8 +16,8 @@ from realizer.expressions.expression import Expression
 from realizer.expressions.timeline import Entry
 from realizer.expressions.timeline_file import MIN_SECONDS
 from realizer.tables import HEAD_COLUMNS
-from realizer_studio.corpus.find import runs
-from realizer_studio.corpus.learn import explain, faps_of, features
+from realizer_studio.corpus.face_map import explain, faps_of, features
+from realizer_studio.corpus.finder import runs
 from realizer_studio.corpus.recording import Recording
 
 FPS = 25.0

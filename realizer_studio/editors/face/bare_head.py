@@ -12,7 +12,6 @@ from realizer.core.errors import FaceError
 from realizer.face.features import write_features
 from realizer.face.mesh_checks import surface_faults
 from realizer.face.mesh_geometry import fit_ball
-from realizer_studio.faces.arkit.atlas import make_atlas
 from realizer_studio.faces.arkit.gltf import Gltf
 from realizer_studio.faces.arkit.head import Head, Report
 from realizer_studio.faces.arkit.importer import describe_head, write_surface
@@ -21,9 +20,10 @@ from realizer_studio.faces.arkit.orientation import EYE_DISTANCES, UNITS, USUAL_
 from realizer_studio.faces.arkit.part_classifier import FLOOR, HALF_WIDTH, ROUND, sort_parts
 from realizer_studio.faces.arkit.points import points_of
 from realizer_studio.faces.arkit.scene import read_pieces
-from realizer_studio.faces.mpeg4.build import apply_zones
+from realizer_studio.faces.arkit.texture_atlas import make_atlas
 from realizer_studio.faces.mpeg4.defaults import default_setup
 from realizer_studio.faces.mpeg4.parameters import FILE, write_setup
+from realizer_studio.faces.mpeg4.zone_build import apply_zones
 from realizer_studio.faces.mpeg4.zones import mirrorable
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply")

@@ -17,12 +17,12 @@ from realizer.face.mesh_geometry import nearest_vertex
 from realizer.face.reading import read_arrays
 from realizer.tables import action_units, csv_rows, faps
 from realizer_studio.faces.mpeg4 import rigid
-from realizer_studio.faces.mpeg4.build import bind_to_skin, setup_of
 from realizer_studio.faces.mpeg4.defaults import default_setup
 from realizer_studio.faces.mpeg4.fap_limits import usual_range
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS, pairs
-from realizer_studio.faces.mpeg4.landmarks import PUPILS, TEETH, template
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup, setup_table
+from realizer_studio.faces.mpeg4.point_finder import PUPILS, TEETH, template
+from realizer_studio.faces.mpeg4.zone_build import bind_to_skin, setup_of
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS, pairs
 from realizer_studio.faces.mpeg4.zones import Setup, mirrorable
 
 FACE_NAME = re.compile(r"[^a-z0-9_-]+")  # characters that are not allowed in a face's name

@@ -27,10 +27,10 @@ from realizer_studio.editors.face.head_message import FACE_NAME, head_message, i
 from realizer_studio.editors.face.unit_fits import FILES as UNIT_FILES
 from realizer_studio.editors.face.unit_fits import UnitFits
 from realizer_studio.editors.packed_messages import packed, unpacked
-from realizer_studio.faces.mpeg4.build import FILES, copy_with_zones
 from realizer_studio.faces.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
 from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup, setup_from, setup_table, write_setup
+from realizer_studio.faces.mpeg4.zone_build import FILES, copy_with_zones
 
 FACES = "faces"  # in the folder of the setting `edit`
 FOR_SETTING = "start the service with --edit DIR, or use realizer faces edit NAME"

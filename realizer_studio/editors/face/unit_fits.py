@@ -26,9 +26,9 @@ from realizer.face.fap_mapping import mapping_of
 from realizer.face.load import MODEL
 from realizer.face.model import Face
 from realizer.tables import action_units
-from realizer_studio.faces.au.fit import FORMS, MOVES, fit_models, table, table_text
 from realizer_studio.faces.au.fit_limits import runaways
 from realizer_studio.faces.au.measure import COLLAR, OPEN, UnitMeasurement, read_shapes, write_shapes
+from realizer_studio.faces.au.unit_fit import FORMS, MOVES, fit_models, table, table_text
 
 SHAPES = "au_shapes.npz"
 FILES = ("au_published.toml", MODEL, SHAPES, "au_to_fap.csv", "au_to_fap.txt")  # of a face's action units

@@ -17,18 +17,18 @@ from realizer.face.load import load_face
 from realizer.face.maps import NAMES
 from realizer.face.mesh_geometry import fit_ball, vertex_normals
 from realizer.face.model import Face
-from realizer_studio.faces.arkit.atlas import SIZE, Atlas, make_atlas
-from realizer_studio.faces.arkit.fields import ShapedSkin, shape_fields
 from realizer_studio.faces.arkit.head import Head, Report, fap_sources, read_head
 from realizer_studio.faces.arkit.mesh_merge import Surface
 from realizer_studio.faces.arkit.mouth import drag_of, joint_of, mouth_of
 from realizer_studio.faces.arkit.part_classifier import ball_behind
 from realizer_studio.faces.arkit.points import points_of
+from realizer_studio.faces.arkit.shape_fields import ShapedSkin, shape_fields
+from realizer_studio.faces.arkit.texture_atlas import SIZE, Atlas, make_atlas
 from realizer_studio.faces.au.measure import OPEN, UnitMeasurement, write_shapes
 from realizer_studio.faces.face_files import write_fields, write_head, write_mesh
-from realizer_studio.faces.mpeg4.build import apply_zones, extend_field
 from realizer_studio.faces.mpeg4.defaults import default_setup, split_sides
 from realizer_studio.faces.mpeg4.rigid import opening_rows, sliding
+from realizer_studio.faces.mpeg4.zone_build import apply_zones, extend_field
 from realizer_studio.faces.parts import smooth
 from realizer_studio.faces.person.skin_colours import occlusion
 

@@ -11,7 +11,7 @@ from realizer.face.features import Point
 from realizer.face.mesh_geometry import nearest_vertex, vertex_normals
 from realizer_studio.faces.arkit.mesh_merge import Surface
 from realizer_studio.faces.arkit.part_classifier import ball_behind
-from realizer_studio.faces.mpeg4.landmarks import find_points
+from realizer_studio.faces.mpeg4.point_finder import find_points
 
 PUPILS = {"left_eye": "3.5", "right_eye": "3.6"}
 SPHERE = np.concatenate([np.eye(3), -np.eye(3), np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1)
@@ -28,7 +28,8 @@ def points_of(
 ) -> tuple[dict[str, Point], tuple[str, ...]]:
     """Return the feature points, and the names of those that are guesses.
 
-    Most points come from the geometry (`mpeg4.find_points`). The inner contours of the lips and the edges of
+    Most points come from the geometry (`point_finder.find_points`). The inner contours of the lips and the
+    edges of
     the lids come from blend shapes: vertices that move with the upper lip belong to it, even beside the lower
     lip.
 

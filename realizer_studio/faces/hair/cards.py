@@ -9,7 +9,7 @@ import numpy as np
 from realizer.core.array_types import Float64, Int32, UInt8
 from realizer.face.mesh_geometry import grid
 from realizer_studio.faces.hair.strands import unit
-from realizer_studio.faces.skin.atlas import HAIR
+from realizer_studio.faces.skin.skin_atlas import HAIR
 
 ROUND = 0.25  # lean of a card's normals to its sides, which makes it look like a lock
 

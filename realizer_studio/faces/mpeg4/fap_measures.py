@@ -23,7 +23,7 @@ from realizer.face.mesh_geometry import (
 from realizer.face.model import Face
 from realizer.tables import Fap
 from realizer_studio.faces.eyeball import PUPIL
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS
 
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
 LIDS = {"3.1": "3.3", "3.3": "3.1", "3.2": "3.4", "3.4": "3.2"}

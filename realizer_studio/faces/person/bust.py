@@ -16,7 +16,7 @@ from realizer_studio.faces.person.lips import Lips
 from realizer_studio.faces.person.person import Person
 from realizer_studio.faces.person.recipe import Recipe, appearance_of
 from realizer_studio.faces.person.scalp import Scalp
-from realizer_studio.faces.skin.atlas import EYES
+from realizer_studio.faces.skin.skin_atlas import EYES
 from realizer_studio.faces.teeth import teeth
 
 ORDER = (

@@ -9,7 +9,7 @@ from scipy.ndimage import map_coordinates
 from realizer.core.array_types import Float32, Float64
 from realizer.core.colours import linear, srgb
 from realizer_studio.faces.parts import smooth
-from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.photo.photo_fit import Fit, Observation
 from realizer_studio.faces.photo.shape import Pose
 from realizer_studio.faces.skin.skin import Skin
 

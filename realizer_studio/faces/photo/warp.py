@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 from realizer.core.array_types import Float64
 from realizer.face.reading import read_arrays
 from realizer_studio.faces.parts import smooth
-from realizer_studio.faces.person.build import WARP
-from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.person.person_build import WARP
+from realizer_studio.faces.photo.photo_fit import Fit, Observation
 from realizer_studio.faces.photo.shape import DISTANCE, Pose
 from realizer_studio.tracking.landmarks import COUNT
 

@@ -18,7 +18,7 @@ from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.lips import Lips
 from realizer_studio.faces.person.person import Person
 from realizer_studio.faces.person.recipe import Recipe
-from realizer_studio.faces.skin import atlas
+from realizer_studio.faces.skin import skin_atlas
 from realizer_studio.faces.skin.albedo import paint_albedo
 from realizer_studio.faces.skin.eye_picture import eye_picture
 from realizer_studio.faces.skin.lines import lines_of, regions, weights
@@ -49,15 +49,15 @@ class SkinMaps:
     def arrays(self, parts: Sequence[Part]) -> dict[str, Any]:
         """Return the arrays `uv` and `fold_weights` of mesh.npz, for the parts, the skin first."""
         middle = [
-            (atlas.NEUTRAL.left + atlas.NEUTRAL.right) / 2,
-            (atlas.NEUTRAL.top + atlas.NEUTRAL.bottom) / 2,
+            (skin_atlas.NEUTRAL.left + skin_atlas.NEUTRAL.right) / 2,
+            (skin_atlas.NEUTRAL.top + skin_atlas.NEUTRAL.bottom) / 2,
         ]
         part_uv = [np.tile(middle, (len(part.vertices), 1)) if part.uv is None else part.uv for part in parts]
         corners = [uv[part.triangles] for uv, part in zip(part_uv[1:], parts[1:], strict=True)]
         uv = np.concatenate([self.corners, *corners])
         folds = np.zeros((sum(len(part.vertices) for part in parts), len(self.regions)))
         folds[: len(self.weights)] = self.weights
-        return {"uv": atlas.packed(uv), "fold_weights": to_bytes(255 * folds)}
+        return {"uv": skin_atlas.packed(uv), "fold_weights": to_bytes(255 * folds)}
 
     def head(self) -> dict[str, Any]:
         """Return the table [maps] of face.toml."""
@@ -71,7 +71,7 @@ def bake(
     lids: list[Lid],
     recipe: Recipe,
     part: Part,
-    size: int = atlas.SIZE,
+    size: int = skin_atlas.SIZE,
     paint: Callable[[Skin, Float32], Float32] | None = None,
 ) -> SkinMaps:
     """Bake the maps of a person's skin.
@@ -82,7 +82,7 @@ def bake(
         size: texels of a side.
         paint: maps the skin and its colours (k, 3), sRGB 0..255, to other colours.
     """
-    corners = atlas.corners(person.figure.mesh, part.submesh)
+    corners = skin_atlas.corners(person.figure.mesh, part.submesh)
     texels = Texels(part.vertices, part.triangles, corners, size)
     skin = Skin(texels, part, person, lips, lids, recipe, zlib.crc32(name.encode()) % 2**20)
     lines = lines_of(skin)
@@ -93,7 +93,7 @@ def bake(
     # The renderer computes slopes with one width for all texels.
     step = 255 / RELIEF * np.clip(TEXEL / texels.width, 0.4, 1.5)
     albedo_map = np.dstack([texels.picture(to_bytes(albedo), 255), np.full((size, size), 255, np.uint8)])
-    strands = atlas.HAIR.texels(size)
+    strands = skin_atlas.HAIR.texels(size)
     albedo_map[strands] = hair_texture(strands[0].stop - strands[0].start)
     pictures = {
         "albedo": albedo_map,
@@ -101,7 +101,7 @@ def bake(
         "surface": texels.picture(to_bytes(255 * surface), 255),
         "folds": texels.picture(to_bytes(128 + relief.folds * step), 128),
     }
-    eye = atlas.EYES.texels(size)
+    eye = skin_atlas.EYES.texels(size)
     eye_maps = eye_picture(eye[0].stop - eye[0].start, recipe.colours, skin.seed)
     pictures["albedo"][(*eye, slice(3))], pictures["surface"][eye] = eye_maps
     normals = vertex_normals(part.vertices, part.triangles)

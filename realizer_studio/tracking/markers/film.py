@@ -26,8 +26,8 @@ from realizer_studio.tracking.markers.layout import Layout, numbered, wojdel
 from realizer_studio.tracking.markers.ordering import locate, nearest, order
 from realizer_studio.tracking.markers.repair import normalised, repaired
 from realizer_studio.tracking.network import TrackingError
+from realizer_studio.tracking.person_recording import rate_of
 from realizer_studio.tracking.pictures import Picture
-from realizer_studio.tracking.recording import rate_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -14,7 +14,7 @@ from realizer.tables.mappings import read_mapping
 from tests.commands import run
 
 IMPORTER = "realizer_studio.faces.arkit.importer"
-PHOTO_BUILD = "realizer_studio.faces.photo.build.build_from_photographs"
+PHOTO_BUILD = "realizer_studio.faces.photo.photo_build.build_from_photographs"
 
 
 def test_faces_list_has_a_line_for_each_face_with_its_licence() -> None:

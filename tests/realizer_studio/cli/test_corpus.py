@@ -16,7 +16,7 @@ from realizer_studio.corpus.recording import read_recording, write_recording
 from tests.painted import acted as moved
 from tests.painted import plain, truth
 from tests.portraits import LITERT, faps_of, portrait
-from tests.realizer_studio.corpus.test_learn import acted
+from tests.realizer_studio.corpus.test_face_map import acted
 
 
 def run(*args: object) -> Result:

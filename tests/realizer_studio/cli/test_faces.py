@@ -19,7 +19,7 @@ from tests.commands import run
 from tests.waiting import LIMIT
 
 IMPORTER = "realizer_studio.faces.arkit.importer"
-PHOTO_BUILD = "realizer_studio.faces.photo.build.build_from_photographs"
+PHOTO_BUILD = "realizer_studio.faces.photo.photo_build.build_from_photographs"
 
 
 def test_faces_zones_of_an_unknown_face_exits_with_2(tmp_path: Path) -> None:

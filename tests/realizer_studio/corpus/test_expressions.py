@@ -12,7 +12,7 @@ from realizer.animation.axis import AU_NAMES
 from realizer.cli import cli
 from realizer.expressions.library import library_of
 from realizer_studio.corpus.expressions import found_expressions, units_of, write_expressions
-from realizer_studio.corpus.learn import features, template_faps
+from realizer_studio.corpus.face_map import features, template_faps
 from realizer_studio.corpus.recording import Annotation, Recording, write_recording
 from realizer_studio.corpus.statistics import Study
 from tests.portraits import faps_of

@@ -17,9 +17,9 @@ from realizer_studio.faces.person.bust import assemble
 from realizer_studio.faces.person.makehuman import BaseMesh, Figure
 from realizer_studio.faces.person.person import Person
 from realizer_studio.faces.person.recipe import Recipe
-from realizer_studio.faces.skin.atlas import corners
 from realizer_studio.faces.skin.maps import SkinMaps, bake
 from realizer_studio.faces.skin.skin import Skin
+from realizer_studio.faces.skin.skin_atlas import corners
 from realizer_studio.faces.skin.texels import Texels
 
 STEP = 0.006  # m between the vertices of the mask

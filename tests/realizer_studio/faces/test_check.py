@@ -15,8 +15,8 @@ from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
 from realizer.face.load import folder_of, load_face
 from realizer_studio.faces.check import check_face
-from realizer_studio.faces.mpeg4.build import setup_of
 from realizer_studio.faces.mpeg4.parameters import write_setup
+from realizer_studio.faces.mpeg4.zone_build import setup_of
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ import pytest
 from bml_schema import parse
 from realizer.animation.fap.fap_reader import read_fap
 from realizer_studio.tracking.files import FORMATS, by_mapping, unit_columns
-from realizer_studio.tracking.recording import Recording
+from realizer_studio.tracking.person_recording import Recording
 from realizer_studio.tracking.regressor import MEASURED_UNITS
 
 

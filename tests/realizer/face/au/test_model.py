@@ -10,8 +10,8 @@ from realizer.face.au.model import HeadTurn, Model, Mouth
 from realizer.face.au.units import units
 from realizer.face.load import load_face
 from realizer.face.model import Face
-from realizer_studio.faces.au.fit import table, table_text
 from realizer_studio.faces.au.measure import read_shapes
+from realizer_studio.faces.au.unit_fit import table, table_text
 from tests.shipped import DEFAULT, FACES, FOLDERS
 
 FORMS = ("published", "extended")

@@ -19,7 +19,7 @@ from realizer.expressions.timeline import Entry, Timeline, Track
 from realizer.expressions.timeline_file import read_timeline, write_timeline
 from realizer.outputs.fap_text import encode
 from realizer.tables import faps
-from realizer_studio.corpus.learn import features
+from realizer_studio.corpus.face_map import features
 from realizer_studio.corpus.recording import Recording
 from realizer_studio.editors.design.documents import export, open_file
 from realizer_studio.editors.design.fap_entries import fap_entries, is_fap

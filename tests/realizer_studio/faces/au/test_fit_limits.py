@@ -14,9 +14,9 @@ from realizer.face.au.file import read_model, write_model
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer_studio.faces.au.fit import fit_models
 from realizer_studio.faces.au.fit_limits import FURTHEST, monitored_points, overshoot, runaways
 from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
+from realizer_studio.faces.au.unit_fit import fit_models
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -110,7 +110,7 @@ def test_fit_command_writes_no_model_that_tears_the_face(
     from realizer_studio.cli.fit_face import fit_face
 
     model = torn(read_model(FOLDER / "au_published.toml"))
-    monkeypatch.setattr("realizer_studio.faces.au.fit.fit_models", lambda *_: {"published": model})
+    monkeypatch.setattr("realizer_studio.faces.au.unit_fit.fit_models", lambda *_: {"published": model})
     done = CliRunner().invoke(fit_face, ["default", "--form", "published", "-o", str(tmp_path)])
     assert isinstance(done.exception, FaceError)
     assert "nothing written" in str(done.exception)

@@ -5,7 +5,7 @@ import pytest
 
 from realizer.face.mesh_geometry import vertex_normals
 from realizer_studio.faces.hair.cards import STRIPS, Patch, hair_texture, joined, ribbons, strip_uv
-from realizer_studio.faces.skin.atlas import HAIR
+from realizer_studio.faces.skin.skin_atlas import HAIR
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from realizer_studio.faces.hair.grow import bun, cap, hair, tints
 from realizer_studio.faces.hair.strands import edge
 from realizer_studio.faces.hair.style import Style, style_of
 from realizer_studio.faces.person.scalp import Scalp
-from realizer_studio.faces.skin.atlas import HAIR
+from realizer_studio.faces.skin.skin_atlas import HAIR
 
 STYLES = list(read_toml(text_of("hair.toml"), "hair.toml")["styles"])
 BROWN = [70, 48, 36]

@@ -10,9 +10,9 @@ from click.testing import CliRunner
 from realizer.cli.faces import faces
 from realizer.core.errors import FaceError
 from realizer.face.load import folder_of, load_face
-from realizer_studio.faces.mpeg4.build import setup_of
 from realizer_studio.faces.mpeg4.faceeditor import fitted, read_faceeditor, write_faceeditor
 from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
+from realizer_studio.faces.mpeg4.zone_build import setup_of
 from realizer_studio.faces.mpeg4.zones import Setup, Zone
 
 FILE = """<?xml version="1.0"?>

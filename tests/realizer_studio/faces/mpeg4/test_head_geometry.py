@@ -8,7 +8,7 @@ import pytest
 from realizer.face.load import load_face
 from realizer.face.mesh_geometry import grid, vertex_normals
 from realizer_studio.faces.mpeg4.head_geometry import HeadGeometry, find_anchors, profile_line
-from realizer_studio.faces.mpeg4.landmarks import head_of
+from realizer_studio.faces.mpeg4.point_finder import head_of
 
 
 def wall(front: np.ndarray) -> HeadGeometry:

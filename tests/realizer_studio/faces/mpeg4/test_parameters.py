@@ -8,8 +8,8 @@ import pytest
 
 from realizer.core.errors import FaceError
 from realizer.face.load import folder_of
-from realizer_studio.faces.mpeg4.build import setup_of
 from realizer_studio.faces.mpeg4.parameters import read_setup, write_setup
+from realizer_studio.faces.mpeg4.zone_build import setup_of
 
 
 def test_read_setup_returns_what_write_setup_wrote(tmp_path: Path) -> None:

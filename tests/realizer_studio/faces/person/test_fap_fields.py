@@ -7,7 +7,7 @@ import pytest
 
 from realizer.face.basis import BEYOND, FAPS, JAW_COS, JAW_DROP, JAW_SIN, LIMITS, TONGUE_COS, TONGUE_SIN
 from realizer.tables import faps
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS
 from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.makehuman import Figure
 

@@ -9,7 +9,7 @@ from realizer.face.basis import BEYOND, LIMITS
 from realizer.face.load import load_face
 from realizer.tables import faps
 from realizer_studio.faces.mpeg4.fap_measures import Measure, flips_of
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS
 from realizer_studio.faces.person.makehuman import Figure
 from tests.shipped import FACES
 

@@ -7,11 +7,11 @@ import pytest
 from PIL import Image
 
 from realizer.core.colours import linear, srgb
-from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.photo.photo_fit import Fit, Observation
 from realizer_studio.faces.photo.shape import LandmarkAnchors, Pose
 from realizer_studio.faces.photo.texture import Painter, Projected, projected, unlit
 from realizer_studio.faces.skin.skin import Skin
-from tests.realizer_studio.faces.photo.test_fit import view
+from tests.realizer_studio.faces.photo.test_photo_fit import view
 
 pytestmark = pytest.mark.xdist_group("mask")
 SCALE = 2000.0

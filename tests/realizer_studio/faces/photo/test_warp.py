@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer_studio.faces.photo.fit import Fit, Observation
+from realizer_studio.faces.photo.photo_fit import Fit, Observation
 from realizer_studio.faces.photo.shape import LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.warp import WARP, Warp, read_warp, warp_of
-from tests.realizer_studio.faces.photo.test_fit import SCALE, view
+from tests.realizer_studio.faces.photo.test_photo_fit import SCALE, view
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from realizer_studio.faces.person.lids import Lid
 from realizer_studio.faces.person.lips import Lips
 from realizer_studio.faces.person.person import Person
 from realizer_studio.faces.person.recipe import Recipe
-from realizer_studio.faces.skin.atlas import EYES, NEUTRAL
 from realizer_studio.faces.skin.maps import RELIEF, SkinMaps, bake
+from realizer_studio.faces.skin.skin_atlas import EYES, NEUTRAL
 
 pytestmark = pytest.mark.xdist_group("mask")
 

@@ -12,10 +12,10 @@ from realizer.face.basis import unpack
 from realizer.face.load import folder_of, load_face
 from realizer.face.mesh_geometry import part_triangles
 from realizer.tables import faps
-from realizer_studio.faces.arkit.fields import ShapedSkin, shape_fields
 from realizer_studio.faces.arkit.mouth import mouth_of
+from realizer_studio.faces.arkit.shape_fields import ShapedSkin, shape_fields
 from realizer_studio.faces.mpeg4.defaults import split_sides
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS
 
 pytestmark = pytest.mark.xdist_group("fits")
 

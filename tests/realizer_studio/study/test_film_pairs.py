@@ -1,4 +1,4 @@
-"""Tests of `realizer_studio.study.films`."""
+"""Tests of `realizer_studio.study.film_pairs`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import bml_schema
 from realizer.behaviours.registry import VOCABULARY
 from realizer_studio.study.drawing import Variant
-from realizer_studio.study.films import TAG, control, films
+from realizer_studio.study.film_pairs import TAG, control, films
 
 
 def test_control_has_as_many_expressions_at_words() -> None:

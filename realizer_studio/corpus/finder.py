@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from realizer.core.array_types import Bool
-from realizer_studio.corpus.learn import FaceMap, distances, features
+from realizer_studio.corpus.face_map import FaceMap, distances, features
 from realizer_studio.corpus.recording import Recording, Segment
 
 FINDER = "map"  # annotator of the segments

@@ -14,7 +14,10 @@ from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer_studio.faces.check import check_face
-from realizer_studio.faces.mpeg4.build import (
+from realizer_studio.faces.mpeg4.faceeditor import write_faceeditor
+from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
+from realizer_studio.faces.mpeg4.parameters import FILE, write_setup
+from realizer_studio.faces.mpeg4.zone_build import (
     FILES,
     apply_zones,
     bind_to_skin,
@@ -22,9 +25,6 @@ from realizer_studio.faces.mpeg4.build import (
     extend_field,
     setup_of,
 )
-from realizer_studio.faces.mpeg4.faceeditor import write_faceeditor
-from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
-from realizer_studio.faces.mpeg4.parameters import FILE, write_setup
 
 pytestmark = pytest.mark.xdist_group("faces")
 

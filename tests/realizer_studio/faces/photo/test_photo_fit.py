@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from realizer.core.errors import FaceError
 from realizer_studio.faces.eyeball import LIMBUS
-from realizer_studio.faces.photo.fit import IRIS, VISIBLE_IRIS, fit_person, outline
+from realizer_studio.faces.photo.photo_fit import IRIS, VISIBLE_IRIS, fit_person, outline
 from realizer_studio.faces.photo.shape import DISTANCE, LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.views import View
 from realizer_studio.tracking.region import Region

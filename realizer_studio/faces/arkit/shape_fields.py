@@ -15,7 +15,7 @@ from realizer.core.array_types import Float64, Int32
 from realizer.face.mesh_geometry import half_edges, neighbour_mean
 from realizer.tables import faps
 from realizer_studio.faces.arkit.mouth import Mouth
-from realizer_studio.faces.mpeg4.fields import DIRECTIONS
+from realizer_studio.faces.mpeg4.zone_fields import DIRECTIONS
 from realizer_studio.faces.mpeg4.zones import Triple
 from realizer_studio.faces.parts import smooth
 

@@ -14,7 +14,7 @@ from realizer.face.features import NAMES
 from realizer.face.load import folder_of, list_faces, load_face
 from realizer_studio.faces.check import check_face
 from realizer_studio.faces.mpeg4.fap_scores import mean_score, score_faps
-from realizer_studio.faces.mpeg4.landmarks import find_points
+from realizer_studio.faces.mpeg4.point_finder import find_points
 
 FACES = [info.name for info in list_faces()]
 BENT: dict[str, Callable[[np.ndarray], np.ndarray]] = {

@@ -23,9 +23,9 @@ from realizer_studio.faces.face_files import write_fields
 from realizer_studio.faces.mpeg4 import rigid
 from realizer_studio.faces.mpeg4.defaults import default_setup, split_sides
 from realizer_studio.faces.mpeg4.faceeditor import fitted, read_faceeditor
-from realizer_studio.faces.mpeg4.fields import zone_fields
-from realizer_studio.faces.mpeg4.landmarks import find_points
 from realizer_studio.faces.mpeg4.parameters import FILE, read_setup, write_setup
+from realizer_studio.faces.mpeg4.point_finder import find_points
+from realizer_studio.faces.mpeg4.zone_fields import zone_fields
 from realizer_studio.faces.mpeg4.zones import Setup, mask_faults, synchronised
 
 FILES = (

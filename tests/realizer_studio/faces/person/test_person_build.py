@@ -12,7 +12,7 @@ from realizer.face.deform import deform
 from realizer.face.load import load_face
 from realizer.face.model import Face
 from realizer_studio.faces.parts import Part
-from realizer_studio.faces.person import build
+from realizer_studio.faces.person import person_build as build
 from realizer_studio.faces.person.bust import ORDER
 from realizer_studio.faces.person.makehuman import OBJ
 from realizer_studio.faces.person.person import Person

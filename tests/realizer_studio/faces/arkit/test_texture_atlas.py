@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realizer_studio.faces.arkit.atlas import PAD, SIZE, Atlas, make_atlas, pack
 from realizer_studio.faces.arkit.materials import CLAMP, MIRROR, REPEAT, Chart, Material, Texture
 from realizer_studio.faces.arkit.mesh_merge import Surface
+from realizer_studio.faces.arkit.texture_atlas import PAD, SIZE, Atlas, make_atlas, pack
 
 CORNERS = np.array([[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]])
 

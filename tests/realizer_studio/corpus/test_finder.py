@@ -1,11 +1,11 @@
-"""Tests of `realizer_studio.corpus.find`."""
+"""Tests of `realizer_studio.corpus.finder`."""
 
 import numpy as np
 
-from realizer_studio.corpus.find import agreement, find, segments
-from realizer_studio.corpus.learn import learn
+from realizer_studio.corpus.face_map import learn
+from realizer_studio.corpus.finder import agreement, find, segments
 from realizer_studio.corpus.recording import Segment
-from tests.realizer_studio.corpus.test_learn import acted
+from tests.realizer_studio.corpus.test_face_map import acted
 
 
 def shown(text: str) -> np.ndarray:

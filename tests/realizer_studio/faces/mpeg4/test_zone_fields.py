@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer_studio.faces.mpeg4.fields import zone_fields
+from realizer_studio.faces.mpeg4.zone_fields import zone_fields
 from realizer_studio.faces.mpeg4.zones import Setup, Zone, synchronised
 
 # A sheet of skin, 1 mm apart, in the plane z = 0.

@@ -14,8 +14,8 @@ from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
-from realizer_studio.faces.au.fit import fit_models, left_out_text, table, table_text
 from realizer_studio.faces.au.measure import read_measurements, read_shapes
+from realizer_studio.faces.au.unit_fit import fit_models, left_out_text, table, table_text
 
 pytestmark = pytest.mark.xdist_group("fits")
 
@@ -146,8 +146,8 @@ def test_fit_command_writes_a_file_for_each_form(
     def fit_again(face: Face, measured: object, forms: tuple[str, ...], *_: object) -> dict[str, Model]:
         return {form: models[form] for form in forms}
 
-    monkeypatch.setattr("realizer_studio.faces.au.fit.fit_models", fit_again)
-    monkeypatch.setattr("realizer_studio.faces.au.fit.left_out_text", lambda *_: "")  # fits again
+    monkeypatch.setattr("realizer_studio.faces.au.unit_fit.fit_models", fit_again)
+    monkeypatch.setattr("realizer_studio.faces.au.unit_fit.left_out_text", lambda *_: "")  # fits again
     given = ["default", "--from", str(path), "-o", str(tmp_path)]
     done = CliRunner().invoke(fit_face, [*given, *words], catch_exceptions=False)
     assert done.exit_code == 0, done.output

@@ -1,4 +1,4 @@
-"""Tests of `realizer_studio.corpus.learn`."""
+"""Tests of `realizer_studio.corpus.face_map`."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer_studio.corpus.learn import (
+from realizer_studio.corpus.face_map import (
     SIDE,
     borders,
     explain,

@@ -7,7 +7,7 @@ import pytest
 
 from realizer_studio.faces.parts import Part, Submesh
 from realizer_studio.faces.person.makehuman import BaseMesh, Figure
-from realizer_studio.faces.skin.atlas import EYES, HAIR, NEUTRAL, corners, packed
+from realizer_studio.faces.skin.skin_atlas import EYES, HAIR, NEUTRAL, corners, packed
 
 pytestmark = pytest.mark.xdist_group("mask")
 

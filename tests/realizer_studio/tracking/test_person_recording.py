@@ -8,7 +8,7 @@ import pytest
 from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.follower import Person
 from realizer_studio.tracking.landmarks import landmarks
-from realizer_studio.tracking.recording import Recording, rate_of, record
+from realizer_studio.tracking.person_recording import Recording, rate_of, record
 from realizer_studio.tracking.regressor import MEASURED_UNITS
 from tests.portraits import LITERT, faps_of, portrait
 

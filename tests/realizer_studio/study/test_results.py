@@ -1,4 +1,4 @@
-"""Tests of `realizer_studio.study.analysis`."""
+"""Tests of `realizer_studio.study.results`."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from realizer_studio.corpus.statistics import Table
-from realizer_studio.study.analysis import PAUL, matching, scores, tables, write_report
 from realizer_studio.study.answers import Answer, read_answers
 from realizer_studio.study.items import EMOTIONS, Item
+from realizer_studio.study.results import PAUL, matching, scores, tables, write_report
 from tests.studies import displaced, key, kit, line, matches, named, picture, simulated, write
 
 

@@ -13,11 +13,11 @@ from realizer.core.colours import linear, srgb
 from realizer.core.errors import FaceError
 from realizer.tables import toml_table
 from realizer_studio.faces.person import makehuman
-from realizer_studio.faces.person.build import RECIPE, Photographs, build_face
 from realizer_studio.faces.person.person import person_of
+from realizer_studio.faces.person.person_build import RECIPE, Photographs, build_face
 from realizer_studio.faces.person.recipe import recipe_text
 from realizer_studio.faces.person.sliders import person_tables, person_targets
-from realizer_studio.faces.photo.fit import fit_person
+from realizer_studio.faces.photo.photo_fit import fit_person
 from realizer_studio.faces.photo.texture import Painter
 from realizer_studio.faces.photo.views import View, read_views
 from realizer_studio.faces.photo.warp import warp_of
