@@ -20,6 +20,7 @@ from bml_schema.nodes import (
     CORE,
     DRAFTS,
     EXTENSIONS,
+    LANGUAGE,
     OWN,
     SSML,
     After,
@@ -261,6 +262,8 @@ class ElementReader:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
                 raise Fault(f"wanted one <speak> for {SSML}, got {len(speak) or 'none'}", element)
+            if (language := element.get(LANGUAGE)) and LANGUAGE not in speak[0].attrib:
+                speak[0].set(LANGUAGE, language)  # it is outside of the content
             return Description(**values, content=canonical(speak[0]))
         inside = [escape(element.text or "")]
         for child in element:

@@ -75,6 +75,7 @@ CLIENT = {
 
 # The packages or modules that may import a heavy library.
 IMPORTERS = {
+    "regex": ("realizer.speech.words",),
     "markdown_it": ("realizer.text",),
     "lxml": ("bml_schema",),
     "trimesh": ("realizer.face", "realizer_studio.faces", "realizer_studio.editors.face"),

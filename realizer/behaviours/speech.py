@@ -47,7 +47,7 @@ def speech_request(node: Speech, context: PlanningContext) -> SpeechRequest | No
         spoken = SpokenContent(escape((recording.text if recording else None) or ""), ())
     if spoken is None or len(spoken.ssml) > MAX_TEXT:
         return None
-    language = spoken.language or context.language
+    language = spoken.language or node.unknown_attributes.get(LANGUAGE) or context.language
     if recording is not None and given is not None:
         recording, given = with_times(recording, given), None
     return SpeechRequest(spoken.ssml, spoken.marks, language=language, recording=recording, given=given)

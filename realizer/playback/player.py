@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from bml_schema import Block, Feedback
+from bml_schema.nodes import LANGUAGE
 from realizer.animation.channel import Channel
 from realizer.animation.frames import AUFrames
 from realizer.animation.idle.idle_face import Idle
@@ -97,10 +98,12 @@ class Player:
     def speech_requests(self, block: Block) -> dict[str, SpeechRequest]:
         """Return {behaviour id: request to the voice}, whose results `submit` needs."""
         requests: dict[str, SpeechRequest] = {}
+        language = block.unknown_attributes.get(LANGUAGE)
+        context = replace(self.context, language=language) if language else self.context
         for node in work.counted(block.behaviours):
             kind = self.kinds.get(node.tag)
             request = None if kind is None else kind.speech_request
-            if request is not None and (say := request(node, self.context)) is not None:
+            if request is not None and (say := request(node, context)) is not None:
                 requests[node.id] = say
         return requests
 

@@ -2,7 +2,7 @@
 
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from xml.parsers import expat
 from xml.sax.saxutils import quoteattr, unescape
@@ -13,6 +13,7 @@ from bml_schema.ssml import APART, HIDDEN
 from realizer.core.errors import VoiceError
 from realizer.speech.ssml_prosody import EMPHASIS, is_supported
 from realizer.speech.utterance import MAX_TEXT, SpeechRequest
+from realizer.text.numbers import numbers_in_words
 
 LONGEST_BREAK = 10.0  # s; longer silences are a scheduling matter, not a voice's
 LONGEST_ATTRIBUTE = 200  # characters; engines copy attributes into fixed buffers
@@ -45,7 +46,9 @@ CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
 PICTURES = re.compile(
     "[\U0001f000-\U0001faff\u2600-\u27bf\u2b00-\u2bff\ufe00-\ufe0f\u200d\u20e3\U000e0000-\U000e007f]+"
 )
+BEFORE_SIGN = re.compile(r"\s+(?=[.,;!?])")
 MARKUP = re.compile(r"<[^<>]*>")
+AS_GIVEN = frozenset({"phoneme", "say-as", "sub"})  # what they say is in their attributes
 NAMED = re.compile(
     r"<(?:\w+:)?(?:mark|bookmark|sync)\b[^<>]*?\b(?:name|mark|id)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')"
 )
@@ -128,8 +131,10 @@ def read_script(request: SpeechRequest) -> Script:
     parts = [part for part in parts if not isinstance(part, Mark) or part is firsts.get(part.name)]
     if any(isinstance(part, str) and PICTURES.search(part) for part in parts):
         warnings.append("emoji in the text are not spoken")
-        parts = [PICTURES.sub(" ", part) if isinstance(part, str) else part for part in parts]
-    script = Script(tuple(collapsed(parts)))
+        parts = [
+            BEFORE_SIGN.sub("", PICTURES.sub(" ", part)) if isinstance(part, str) else part for part in parts
+        ]
+    script = Script(tuple(_numbers_in_words(collapsed(parts), request.language)))
     if script.is_silent:
         warnings.append("the text is empty: nothing is spoken")
     return Script(script.parts, tuple(warnings))
@@ -238,6 +243,22 @@ def _scrape(ssml: str) -> Iterator[Part]:
             yield Mark(named[1] if named[1] is not None else named[2])
         place = tag.end()
     yield unescape(ssml[place:].replace("<", " "), {"&quot;": '"', "&apos;": "'"})
+
+
+def _numbers_in_words(parts: Iterable[Part], language: str) -> Iterator[Part]:
+    """Yield the parts with numbers in words of the nearest language."""
+    languages, hidden, before = [language], 0, ""
+    for part in parts:
+        if isinstance(part, Tag):
+            hidden += (part.name in AS_GIVEN) * (1 if part.attributes is not None else -1)
+            if part.attributes is None:
+                languages.pop()
+            else:
+                languages.append(dict(part.attributes).get("xml:lang", languages[-1]))
+        elif isinstance(part, str) and not hidden:
+            part = numbers_in_words(part, languages[-1], before)
+            before = (before + part)[-80:]
+        yield part
 
 
 def collapsed(parts: list[Part]) -> Iterator[Part]:

@@ -1,12 +1,12 @@
 """A tokenizer of scripts: words with their places, pauses and marks."""
 
-import re
 import unicodedata
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import regex
 
 from realizer.speech.ssml import Break, Mark, Script
 from realizer.speech.ssml_prosody import PLAIN, Prosody
@@ -14,10 +14,12 @@ from realizer.tables.phonemes import vowels
 
 # Ideographs and kana are words of their own, as there are no blanks between words.
 SINGLE = r"[\u3040-\u30ff\u3400-\u9fff\uf900-\ufaff\U00020000-\U0003ffff]"
+# A letter, a digit, or what is added to one: a vowel sign, an accent, a joiner.
+LETTER = r"[\p{L}\p{N}\p{M}\u200c\u200d]"
 # Letters with diacritics, joined by apostrophes, hyphens or dots between letters; numbers with their signs.
-WORD = re.compile(
-    rf"{SINGLE}|\d[\d.,:/]*\d|(?:(?!{SINGLE})[^\W_]|[\u0300-\u036f\u0900-\u0dff])+"
-    rf"(?:['’.\u00ad-](?!{SINGLE})[^\W_]+)*|[&%@+=°§#*]|[^\s\w!-/:-@\[-`{{-~]"
+WORD = regex.compile(
+    rf"{SINGLE}\p{{M}}*|\d[\d.,:/]*\d|(?:(?!{SINGLE}){LETTER})+"
+    rf"(?:['’.\u00ad-](?:(?!{SINGLE}){LETTER})+)*|[&%@+=°§#*]|[^\s\w!-/:-@\[-`{{-~]"
 )
 
 

@@ -15,6 +15,9 @@ from realizer.speech.words import PlacedMark, words_in
 OCTAVES = 0.72
 MAX_PITCH = 198.0  # %; the greatest setting
 STOPS = re.compile(r"\.+(?!\w)")
+# Behind a quote, a bracket or a sign it would say "dot".
+CLOSING = " \"'”’»)]"
+STOP_BEHIND = re.compile(r"([\s\"'”’»)\]]+|[^\w\s.,;:!?…])(\.+)(?!\w)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +36,7 @@ def write_document(script: Script) -> Document:
     marks: list[PlacedMark] = []
     for part in _stops_first(script.parts):
         if isinstance(part, str):
+            part = STOP_BEHIND.sub(_stop_first, part)
             words += [(word, len(text) + len(escape(part[:at])) + 1) for word, at in words_in(part)]
             text += escape(part)
         elif isinstance(part, Mark):
@@ -62,6 +66,13 @@ def _stops_first(parts: Sequence[Part]) -> list[Part]:
         if rest := str(part)[stops.end() :]:
             moved.append(rest)
     return moved
+
+
+def _stop_first(found: re.Match[str]) -> str:
+    """Return a full stop before quotes and brackets; behind another sign, a comma. The length is kept."""
+    if found[1][0] in CLOSING:
+        return found[2] + found[1]
+    return found[1] + "," * len(found[2])
 
 
 def _in_its_units(tag: Tag) -> Tag:

@@ -20,6 +20,11 @@ from realizer.speech.utterance import SpeechRequest, Utterance
 WORDS_A_MINUTE = 175  # espeak-ng's own rate
 SLOWEST, FASTEST = 80, 450  # words a minute; the range that it accepts
 MAX_CACHED_WORDS = 4096
+# Scripts that a voice of any language reads by the rules of theirs, instead of letter by letter (measured).
+READ_BY_ALL = frozenset({
+    "BENGALI", "DEVANAGARI", "GEORGIAN", "GUJARATI", "GURMUKHI", "HANGUL", "KANNADA", "MALAYALAM", "SINHALA",
+    "TAMIL",
+})  # fmt: skip
 INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
 
 
@@ -68,7 +73,8 @@ class EspeakVoice(EngineVoice):
             warnings = (*warnings, "espeak-ng found nothing to pronounce in the text")
         id = voice.partition("+")[0]
         tag = next((t for v in hello["voices"] if v["id"] == id for _, t in v["languages"]), "")
-        if (letters := foreign_script(script.text, tag)) is not None:
+        letters = foreign_script(script.text, tag)
+        if letters is not None and letters not in READ_BY_ALL:
             text = f"the text is in {letters} letters, which a voice of {tag} spells one by one"
             warnings = (*warnings, f"{text}: wanted its language, such as {LANGUAGES[letters][0]!r}")
         return replace(said, warnings=(*script.warnings, *warnings))

@@ -239,3 +239,28 @@ def test_resources_leave_out_behaviours_with_faults() -> None:
     keys = f'<bmlt:facekeyframe id="k" type="FAPS">{lines}</bmlt:facekeyframe>'
     text = f'<bml id="b" xmlns:bmlt="http://hmi.ewi.utwente.nl/bmlt">{keys}<gaze id="g" target="x"/></bml>'
     assert Player().resources(parse(text, VOCABULARY)) == {"gaze"}
+
+
+@pytest.mark.parametrize(
+    ("document", "language"),
+    [
+        ('<bml id="b" xml:lang="es"><speech id="s"><text>Hola</text></speech></bml>', "es"),
+        ('<bml id="b" xml:lang="es"><speech id="s" xml:lang="nl"><text>Hola</text></speech></bml>', "nl"),
+        ('<bml id="b"><speech id="s" xml:lang="nl"><text xml:lang="de">Hola</text></speech></bml>', "de"),
+        (
+            '<bml id="b" xml:lang="es"><speech id="s"><description priority="1" xml:lang="fr" '
+            'type="application/ssml+xml"><speak xmlns="">Hola</speak></description></speech></bml>',
+            "fr",
+        ),
+        (
+            '<bml id="b" xml:lang="es"><speech id="s"><description priority="1" xml:lang="fr" '
+            'type="application/ssml+xml"><speak xmlns="" xml:lang="th">Hola</speak></description>'
+            "</speech></bml>",
+            "th",
+        ),
+        ('<bml id="b"><speech id="s"><text>Hola</text></speech></bml>', "en-US"),
+    ],
+)
+def test_speech_is_requested_in_the_nearest_language(document: str, language: str) -> None:
+    requests = Player().speech_requests(parse(document, VOCABULARY))
+    assert requests["s"].language == language

@@ -97,3 +97,17 @@ def test_read_script_keeps_words_of_malformed_markup(pieces: list[str]) -> None:
     assert script.text.count("one") == pieces.count("one")
     # A name is that of one place: the first.
     assert script.marks == ("m",) * ('<mark name="m"/>' in pieces)
+
+
+@each_row(
+    "ssml, text",
+    [
+        ("It costs $5.", "It costs five dollars."),
+        ('Ja, <lang xml:lang="de">5 €</lang> and 5%.', "Ja, fünf Euro and five percent."),
+        ('World War <mark name="m"/>II', "World War two"),
+        ('<sub alias="$5">$6</sub> <say-as interpret-as="characters">5%</say-as>', "$6 5%"),
+        ("I love it ❤️.", "I love it."),
+    ],
+)
+def test_numbers_are_words_of_the_nearest_language(ssml: str, text: str) -> None:
+    assert read_script(SpeechRequest(ssml, ("m",), language="en-GB")).text == text

@@ -1,6 +1,7 @@
 """Words, pauses and marks of a script."""
 
 import pytest
+import regex
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -124,3 +125,26 @@ def test_strip_marks_removes_stress_and_length() -> None:
 
 def test_is_vowel_looks_at_the_first_letter() -> None:
     assert [is_vowel(ipa) for ipa in ("aɪ", "ə", "t", "")] == [True, True, False, False]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "สวัสดีครับ ผมชื่อ",
+        "ສະບາຍດີ",
+        "សួស្តី",
+        "မင်္ဂလာပါ",
+        "が\u3099行\U000e0100く",
+        "\u1112\u1161\u11ab글",
+        "नमस्ते दुनिया",
+        "می\u200cخواهم",
+    ],
+)
+def test_words_never_break_inside_a_letter(text: str) -> None:
+    words = [word for word, _ in words_in(text)]
+    letters = regex.findall(r"\X", text)
+    assert "".join(words) == "".join(text.split())
+    assert all("".join(regex.findall(r"\X", word)) == word and word in text for word in words)
+    assert sum(len(regex.findall(r"\X", word)) for word in words) == len(
+        [one for one in letters if one.strip()]
+    )

@@ -1,8 +1,10 @@
 """espeak-ng, with a test for each of its known traps."""
 
+import re
 import threading
 from dataclasses import replace
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 import pytest
@@ -307,3 +309,28 @@ def test_espeak_does_not_say_dot_after_a_mark(voice: EspeakVoice, end: str) -> N
     assert [p.ipa for p in said.phonemes] == [p.ipa for p in plain.phonemes]
     assert said.marks["m"] == pytest.approx(plain.words[-1].end, abs=0.01)
     assert voice.say(SpeechRequest('It is 3<mark name="m"/>.5.')).words[-1].text != "3."
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "It is 50%.",
+        'He said "hi".',
+        "(yes).",
+        "I love it .",
+        "I love it ❤️.",
+        "World War II.",
+        "C#.",
+        "[so].",
+        "A @.",
+        "‘so’.",
+    ],
+)
+def test_espeak_says_no_sign_that_a_person_would_not(voice: EspeakVoice, text: str) -> None:
+    said = "".join(phoneme.ipa for phoneme in voice.say(SpeechRequest(escape(text))).phonemes)
+    assert not re.search("dɑːt|æstɚ|hæʃ|ɹoʊmən", said)
+
+
+def test_espeak_warns_of_scripts_that_it_spells_only(voice: EspeakVoice) -> None:
+    assert not voice.say(SpeechRequest("안녕하세요")).warnings
+    assert "such as 'th'" in voice.say(SpeechRequest("สวัสดีครับ")).warnings[0]

@@ -97,7 +97,7 @@ def test_hibari_phonemes_have_lip_shapes(neural: HibariVoice) -> None:
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        ('At <mark name="m"/>7:30 pm we go.', "7:30"),
+        ('At <mark name="m"/>7:30 pm we go.', "seven"),
         ('At 7:30 <mark name="m"/>pm we go.', "pm"),
         ('It costs $9.99 <mark name="m"/>today.', "today"),
         ('this and/<mark name="m"/>or that', "or"),
@@ -118,7 +118,7 @@ def test_hibari_marks_are_before_words_that_are_expanded(neural: HibariVoice, te
 
 @hibari
 def test_hibari_numbers_last_as_long_as_all_their_words(neural: HibariVoice) -> None:
-    said = neural.say(SpeechRequest("They paid 1,250,431 euros."))
+    said = neural.say(SpeechRequest("They paid 1250431 euros."))
     number = next(w for w in said.words if w.text.startswith("1"))
     inside = [p.ipa for p in said.phonemes if number.start <= p.start < number.end]
     assert number.end - number.start > 1.5
