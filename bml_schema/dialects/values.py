@@ -9,7 +9,7 @@ from typing import Final
 
 from lxml import etree
 
-from bml_schema.behaviours import DIRECTIONS
+from bml_schema.behaviours import DIRECTIONS, STANCES
 from bml_schema.values import NUMBER, decimal
 
 Attributes = Mapping[str, str]
@@ -38,6 +38,7 @@ _LANGUAGES = {
     "japanese": "ja",
     "spanish": "es",
 }
+_SHAPES = {"eyebrow": "raise", "eyelid": "close"}
 _MOST_STROKES = 100
 
 
@@ -108,6 +109,25 @@ def eyes(element: etree._Element, value: str) -> Attributes | None:
     return {"eyes": next((eyes for mode, eyes in modes.items() if value.lower().startswith(mode)), "WAITING")}
 
 
+def part_of_face(element: etree._Element, value: str) -> Attributes:
+    """The type of a <face> in drafts: without a shape, what its part does most."""
+    if {"shape", "lexeme", "au"}.isdisjoint(element.keys()):
+        return {"shape": next((s for part, s in _SHAPES.items() if value.lower().startswith(part)), "open")}
+    return {}
+
+
+def stance(element: etree._Element, value: str) -> Attributes:
+    """The type of a <posture> in drafts: a stance of the body, or the pose of a part of it."""
+    space = "".join(str(element.tag).rpartition("}")[:2])
+    if _word(value) in STANCES:
+        etree.SubElement(element, f"{space}stance", type=_word(value))
+    lexeme = element.get("lexeme") or ("" if _word(value) in STANCES else value)
+    if lexeme:
+        part = (element.get("part") or "WHOLEBODY").upper()
+        etree.SubElement(element, f"{space}pose", part=part, lexeme=lexeme.upper())
+    return {}
+
+
 def language_tag(name: str) -> str:
     """Return the BCP-47 tag of a language, or ""."""
     name = name.strip()
@@ -117,5 +137,19 @@ def language_tag(name: str) -> str:
 
 FUNCTIONS: Final[Mapping[str, Callable[[etree._Element, str], Attributes | None]]] = {
     f.__name__: f
-    for f in (amount, repeats, toss, parameterized, orient, direction, joints, saccade, au, au_side, eyes)
+    for f in (
+        amount,
+        repeats,
+        toss,
+        parameterized,
+        orient,
+        direction,
+        joints,
+        saccade,
+        au,
+        au_side,
+        eyes,
+        part_of_face,
+        stance,
+    )
 }
