@@ -25,6 +25,7 @@ from bml_schema.behaviours import (
 from bml_schema.bmla import (
     Activate,
     AudioFile,
+    BlinkEmitter,
     FaceInterpolator,
     FaceKeyframe,
     Interrupt,
@@ -71,8 +72,8 @@ from bml_schema.writer import write
 __all__ = [
     "BMLA", "BMLT", "CORE", "EXTENSIONS", "MAX_BEHAVIOURS", "MAX_BYTES", "MAX_DOCUMENTS", "OWN", "VOCABULARY",
     "Activate", "After", "AudioFile", "BMLError", "BMLSizeError", "BMLSyntaxError", "Before", "Behaviour",
-    "Blink", "Block", "BlockPrediction", "BlockProgress", "Constraint", "Description", "Emotion",
-    "Expression", "Face", "FaceFacs", "FaceInterpolator", "FaceKeyframe", "FaceLexeme", "FaceShift", "Fap",
+    "Blink", "BlinkEmitter", "Block", "BlockPrediction", "BlockProgress", "Constraint", "Description",
+    "Emotion", "Expression", "Face", "FaceFacs", "FaceInterpolator", "FaceKeyframe", "FaceLexeme", "FaceShift", "Fap",
     "FapFile", "Faps", "Feedback", "Gaze", "GazeShift", "Gesture", "Head", "HeadDirectionShift", "Idle",
     "Interrupt", "Listen", "Locomotion", "Mood", "ParameterValueChange", "Part", "Place", "Pointing", "Pose",
     "Posture", "PostureShift", "PredictionFeedback", "Problem", "ReducedBlock", "Required", "Speech",

@@ -53,6 +53,15 @@ class ParameterValueChange(Behaviour):
 
 
 @node
+class BlinkEmitter(Behaviour):
+    """Blink again and again, about every `avg_waiting_time` seconds, give or take `range`."""
+
+    tag = bmlt("blinkemitter")
+    avg_waiting_time: float = attribute(number(0.1, 86400), default=5.0, name="avgwaitingtime")
+    range: float = attribute(number(0, 86400), default=0.0)
+
+
+@node
 class AudioFile(Behaviour):
     """Play a sound file of the media folder."""
 

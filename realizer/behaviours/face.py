@@ -5,7 +5,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from bml_schema import Blink, Expression, Face, FaceFacs, FaceLexeme, FaceShift
+from bml_schema import Blink, BlinkEmitter, Expression, Face, FaceFacs, FaceLexeme, FaceShift
 from bml_schema.behaviours import PEAK
 from realizer import tables
 from realizer.animation.axis import Target, au
@@ -16,6 +16,7 @@ from realizer.behaviours.pose_channels import express
 from realizer.core.array_types import Float64
 from realizer.scheduling.timing import Timing
 from realizer.tables.lexemes import face_lexemes
+from realizer.tables.timing import gaps
 
 Part: TypeAlias = FaceLexeme | FaceFacs
 
@@ -135,6 +136,21 @@ def expand_blink(node: Blink, times: Float64, context: PlanningContext) -> tuple
     return pose_channels.hold(pose_channels.columns({(45, node.side): 1.0}, node.amount), times, node.id)
 
 
+def expand_emitter(node: BlinkEmitter, times: Float64, context: PlanningContext) -> tuple[Channel, ...]:
+    """Return the channels of blinks from start to end; equal seeds give equal blinks."""
+    begin, end = times.tolist()
+    row = gaps("blink")
+    shape = np.cumsum([0.0, *(gap.preferred for gap in row.gaps)])
+    chance = np.random.default_rng([context.seed, *node.id.encode()])
+    channels: list[Channel] = []
+    at = begin
+    while True:
+        at += max(node.avg_waiting_time + node.range * chance.uniform(-1, 1), float(shape[-1]))
+        if at + shape[-1] > end:
+            return tuple(channels)
+        channels += pose_channels.hold(pose_channels.columns({(45, "BOTH"): 1.0}, 1.0), at + shape, node.id)
+
+
 AMOUNT = {"amount": "amount"}
 KINDS = (
     BehaviourKind(FaceLexeme, timing, expand_part, check, parameters=AMOUNT),
@@ -151,4 +167,5 @@ KINDS = (
         parameters={"intensity": "intensity", "amount": "intensity"},
     ),
     BehaviourKind(Blink, table_timing("blink"), expand_blink, parameters=AMOUNT),
+    BehaviourKind(BlinkEmitter, table_timing("blinkemitter"), expand_emitter),
 )

@@ -52,7 +52,7 @@ def guarded(kind: BehaviourKind, plugin: str) -> BehaviourKind:
 # Family, a module of this package -> its elements. It is imported when one of them is first used, or at once
 # if their node classes are not in bml_schema.
 ELEMENTS = {
-    "face": "faceLexeme faceFacs face faceShift expression blink",
+    "face": "faceLexeme faceFacs face faceShift expression blink blinkemitter",
     "gaze": "gaze gazeShift",
     "head": "head headDirectionShift",
     "speech": "speech",

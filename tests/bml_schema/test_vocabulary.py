@@ -7,7 +7,7 @@ ELEMENTS = {
     " posture postureShift locomotion",
     EXTENSIONS: "faceFacs",
     BMLA: "interrupt activate parametervaluechange",
-    BMLT: "audiofile facekeyframe",
+    BMLT: "audiofile blinkemitter facekeyframe",
     OWN: "emotion mood expression faps fapFile timeline blink idle listen",
 }
 

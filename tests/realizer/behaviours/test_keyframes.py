@@ -56,8 +56,8 @@ def test_keyframes_that_are_not_at_rest_are_eased(play) -> None:
 @pytest.mark.parametrize(
     ("element", "says"),
     [
-        (keyframe("MORPH", "smile", "0 0\n1 1"), "wanted FAPS or FACS"),
-        ('<bmlt:facekeyframe id="k"/>', "wanted FAPS or FACS"),
+        (keyframe("MORPH", "smile", "0 0\n1 7"), "line 2 of the keys: wanted morphs 0..1, got '1 7'"),
+        ('<bmlt:facekeyframe id="k"/>', "names of morphs such as"),
         ('<bmlt:facekeyframe id="k" type="FAPS"/>', "FaceInterpolator"),
         (keyframe("FAPS", "31 99", KEYS), "FAP numbers 3..68 such as"),
         (keyframe("FAPS", "1 31", KEYS), "got '1'"),
@@ -85,6 +85,22 @@ def test_keyframes_that_cannot_be_read_are_dropped(play, element: str, says: str
     assert played.warnings == [("b:k", "CANNOT_CREATE_BEHAVIOR")]
     assert says in played.warnings_text
     assert played.times("h")
+
+
+@pytest.mark.parametrize("morph", ["mouthSmileLeft", "mouth_smile_left", "AU12_L", "au12L"])
+def test_keyframes_of_morphs_move_what_their_names_say(play, morph: str) -> None:
+    played = play(keyframe("MORPH", morph, "0 0\n1 1\n2 0"))
+    assert not played.warnings
+    moved = played.aus(1.0)
+    assert moved["12L"] > 0.5
+    assert not moved.get("12R")
+
+
+def test_keyframes_of_unknown_morphs_are_named(play) -> None:
+    played = play(keyframe("MORPH", "smile Body_Shape_7", "0 0 0\n1 1 1\n2 0 0"))
+    assert played.warnings == [("b:k", "CUSTOM_ATTRIBUTE_NOT_SUPPORTED")]
+    assert "got Body_Shape_7; they do not move" in played.warnings_text
+    assert played.aus(1.0)["12L"] > 0.5
 
 
 def test_keyframes_of_faps_beyond_their_range_are_limited_with_a_warning(play) -> None:
