@@ -1,6 +1,5 @@
 """Events of blocks in the order of report, and the BML feedback about them."""
 
-import heapq
 from collections.abc import Collection, Iterator, Mapping
 from enum import IntEnum, auto
 from math import inf, isfinite
@@ -156,10 +155,6 @@ class Reports:
         return pending
 
 
-# The heap may have as many obsolete entries as valid ones, and this many more.
-SPARE = 16
-
-
 class EventQueue:
     """A queue of future events."""
 
@@ -167,8 +162,6 @@ class EventQueue:
         self._first: Event | None = None
         # Number of a block -> its events, in reverse order.
         self._events: dict[int, list[Event]] = {}
-        # A heap of the first event of each block, and of obsolete events.
-        self._firsts: list[Event] = []
 
     @property
     def next(self) -> float | None:
@@ -184,10 +177,7 @@ class EventQueue:
                 return
             events = self._events[first.block]
             events.pop()
-            if events:
-                heapq.heapreplace(self._firsts, events[-1])
-            else:
-                heapq.heappop(self._firsts)
+            if not events:
                 del self._events[first.block]
             self._find_next()
             yield first
@@ -206,10 +196,6 @@ class EventQueue:
         due.append(Event(end, order, Phase.END, block=number))
         due.sort(reverse=True)
         self._events[number] = due
-        heapq.heappush(self._firsts, due[-1])
-        if len(self._firsts) > 2 * len(self._events) + SPARE:
-            self._firsts = [events[-1] for events in self._events.values()]
-            heapq.heapify(self._firsts)
         self._find_next()
 
     def pending(self, playing: ActiveBlock) -> set[tuple[str, str]]:
@@ -220,19 +206,10 @@ class EventQueue:
         """Remove all events."""
         self._first = None
         self._events.clear()
-        self._firsts.clear()
 
     def drop(self, playing: ActiveBlock) -> None:
-        if self._events.pop(playing.number, None) is not None:
-            self._find_next()
+        self._events.pop(playing.number, None)
+        self._find_next()
 
     def _find_next(self) -> None:
-        """Find the first event; remove obsolete entries from the top of the heap."""
-        self._first = None
-        while self._firsts:
-            first = self._firsts[0]
-            events = self._events.get(first.block)
-            if events and events[-1] is first:
-                self._first = first
-                return
-            heapq.heappop(self._firsts)
+        self._first = min((events[-1] for events in self._events.values()), default=None)
