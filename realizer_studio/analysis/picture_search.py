@@ -21,7 +21,7 @@ from realizer.render.renderer import Renderer
 
 HEIGHT = 96  # pixels of compared pictures; small, so that brows of different heights overlap
 FINE = 4  # pictures are drawn larger by this factor and reduced, to be smooth
-STEPS = (0.5, 1.0)  # compared intensities, as they move different places
+STEPS = (0.5, 1.0)  # compared intensities, which move different regions
 LIGHT = "portrait"  # the light of the reference pictures
 MIN_CORRELATION = 0.8  # of a front view with the neutral face
 # A picture is neutral if its difference from the neutral face is small (root mean square, of white; drawing
@@ -60,7 +60,7 @@ def by_picture(
 ) -> Likeness:
     """Return the face, light and expressions that are most similar to a picture.
 
-    The face and light are those whose neutral picture has the best correlation. The difference to that
+    The face and light are those whose neutral picture has the best correlation. The difference from that
     picture is then compared with the difference that each expression makes, regardless of its strength.
 
     Args:

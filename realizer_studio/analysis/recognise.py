@@ -164,7 +164,7 @@ def recogniser(profiles: str = "own") -> Recogniser:
 
 
 def _profile_of(name: str, units: Mapping[int, float]) -> Profile:
-    """Return the profile of action units, as wide as our own are."""
+    """Return the profile of action units, with ranges as wide as those of the set "own"."""
     row = au_row({(unit, "BOTH"): intensity for unit, intensity in units.items()})
     values = to_fap(AUFrames(np.zeros(1), row[None])).values[0].astype(np.float64)
     spread = emotion_model().spread * np.abs(values)

@@ -1,1 +1,1 @@
-"""What the Face tab of the page asks of the service."""
+"""The editor behind the page's tab Face."""

@@ -29,9 +29,8 @@ def points_of(
     """Return the feature points, and the names of those that are guesses.
 
     Most points come from the geometry (`point_finder.find_points`). The inner contours of the lips and the
-    edges of
-    the lids come from blend shapes: vertices that move with the upper lip belong to it, even beside the lower
-    lip.
+    edges of the lids come from blend shapes: vertices that move with the upper lip belong to it, even beside
+    the lower lip.
 
     Args:
         painted: whether the eyes are part of the skin.

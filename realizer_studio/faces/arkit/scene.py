@@ -227,7 +227,7 @@ def _colours(gltf: Gltf, attributes: dict[str, Any], n: int, where: str) -> tupl
 def _texture_coordinates(
     gltf: Gltf, material: Material, attributes: dict[str, Any], n: int, where: str
 ) -> tuple[Float64, Material, tuple[str, ...]]:
-    """Return the places (n, 2) in a material's textures; without textures if the vertices have no places."""
+    """Return the texture coordinates (n, 2) of a material, which loses its textures if there are none."""
     chart = material.chart
     if not material.textures or chart.name not in attributes:
         notes = (f"no {chart.name}: textures are left out",) if material.textures else ()
@@ -242,19 +242,19 @@ def _texture_coordinates(
 
 
 def _is_glass(gltf: Gltf, material: Material, uv: Float64, alpha: Float64, triangles: Any) -> bool:
-    """Return whether light goes through nearly all triangles."""
+    """Return whether nearly all triangles are transparent."""
     if material.transmission > 1 - MAX_GLASS_ALPHA:
         return True
     if material.alpha != "BLEND" or not len(triangles):
         return False
-    visible = alpha[triangles].mean(axis=1) * material.colour[3]
+    opacity = alpha[triangles].mean(axis=1) * material.colour[3]
     base = dict(material.textures).get("base")
     pixels = gltf.pixels(base.image) if base else None
     if pixels is not None:
         height, width = pixels.shape[:2]
         x, y = (uv[triangles].mean(axis=1) * (width, height)).astype(int).T
-        visible = visible * pixels[y % height, x % width, 3] / 255
-    return float(np.percentile(visible, 90)) < MAX_GLASS_ALPHA
+        opacity = opacity * pixels[y % height, x % width, 3] / 255
+    return float(np.percentile(opacity, 90)) < MAX_GLASS_ALPHA
 
 
 EXTENSION = "KHR_draco_mesh_compression"
@@ -262,7 +262,7 @@ UNDO = "npx @gltf-transform/cli copy HEAD.glb PLAIN.glb"
 
 
 def unpack_primitive(gltf: Gltf, primitive: dict[str, Any], where: str) -> None:
-    """Put what a primitive packs in the place of its accessors.
+    """Replace the accessors of a primitive by its decoded Draco data.
 
     Raises:
         FaceError: DracoPy is not installed, or the data are broken.
@@ -285,5 +285,5 @@ def unpack_primitive(gltf: Gltf, primitive: dict[str, Any], where: str) -> None:
             gltf.put(primitive["indices"], found.faces.reshape(-1, 1))
     except FaceError:
         raise
-    except Exception as error:  # DracoPy's own errors have no common class
+    except Exception as error:  # errors of DracoPy have no common class
         raise FaceError(f"{where}: Draco's data are broken ({error}); export the head again") from None

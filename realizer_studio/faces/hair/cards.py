@@ -54,7 +54,7 @@ def ribbons(
     """Return a card along each line.
 
     Args:
-        places, ups: (s, k, 3) along the lines, root first, and the normals of the surface there.
+        positions, normals: (s, k, 3) along the lines, root first, and normals of the surface.
         width: (s, k) metres.
         strips: (s,) names in `STRIPS`.
         colours: (s, 3); occlusion: (s, k).

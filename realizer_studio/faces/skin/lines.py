@@ -100,7 +100,7 @@ def _course(knots: Float64, offset: float, slant: float) -> tuple[Float64, Float
     """Return the curve (j, 2) parallel to knots (i, 2), and the weight of each knot at its points (j, i).
 
     Args:
-        off: metres between knots and curve; slant: metres by which this grows from end to end.
+        offset: metres between knots and curve; slant: metres by which this grows from end to end.
     """
     along = np.r_[0, np.cumsum(np.linalg.norm(np.diff(knots, axis=0), axis=1))]
     where = np.linspace(0, along[-1], max(8, int(along[-1] / STEP)))
