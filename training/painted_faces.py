@@ -22,7 +22,7 @@ from realizer.render.light import Light, presets
 from realizer.render.raster import SoftwareCanvas
 from realizer.render.worker import shapes
 from realizer.tables.cooccurrence import rules
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region
 from realizer_studio.tracking.regressor import UNITS
 
 # Units that are often seen together (of emotions and of speech), beside random ones.

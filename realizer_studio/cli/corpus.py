@@ -12,9 +12,8 @@ from realizer.cli.options import option
 from realizer.cli.progress import note
 from realizer.core.settings import Settings
 from realizer_studio.cli.faces import serve_tab
-from realizer_studio.cli.marker_options import follow as follow_markers
-from realizer_studio.cli.marker_options import marker_options, marker_settings
 from realizer_studio.cli.track import follow as follow_faces
+from realizer_studio.cli.track import follow_markers, marker_options, marker_settings
 
 folder = click.argument("folder", metavar="DIR", type=options.FOLDER)
 SEGMENT = (click.FLOAT, click.FLOAT, click.STRING)

@@ -24,7 +24,7 @@ from realizer.render.light import preset
 from realizer.render.renderer import Renderer
 from realizer.tables import Fap, by_number, faps, regions
 from realizer.tables.emotions import emotion_faces, ring
-from realizer_studio.study.difference_image import MAX_DIFFERENCE, difference, faint, flatten, ramp
+from realizer_studio.study.drawing import MAX_DIFFERENCE, difference, faint, flatten, ramp
 
 SCALE = (260, 16)  # pixels of the scale of colours
 HALF, TURN = 512, 34907  # half of the unit distance (Paul 2010, 4.4.2), and 20 degrees for rotations

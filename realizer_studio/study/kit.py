@@ -18,8 +18,7 @@ import numpy as np
 from realizer.core.atomic_files import write_text
 from realizer.face.load import list_faces
 from realizer_studio.study.drawing import Drawer, Variant
-from realizer_studio.study.film_pairs import films
-from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item, checks, displacements, naming
+from realizer_studio.study.items import ANSWERS, KINDS, WHEEL, Item, checks, displacements, films, naming
 from realizer_studio.study.matching import TRIPLES, Reference, matching, references
 
 MATCHING = ("visual", "emotional")

@@ -13,8 +13,8 @@ import numpy as np
 from realizer.core.atomic_files import replacing, write_bytes
 from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.landmarks import MIN_PRESENCE, NEW_PRESENCE, Landmarks, landmarks
+from realizer_studio.tracking.network import Region
 from realizer_studio.tracking.pictures import Picture
-from realizer_studio.tracking.region import Region
 
 DETECT_EVERY = 15  # pictures between detections of new people
 SMALL_EVERY, SMALL_LOST = 150, 5  # pictures between searches of small faces, with and without people

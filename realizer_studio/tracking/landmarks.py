@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from realizer.core.array_types import Float32, Float64
-from realizer_studio.tracking.network import network
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region, network
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -17,7 +17,7 @@ from realizer.core.errors import FaceError
 from realizer_studio.faces.eyeball import LIMBUS
 from realizer_studio.faces.photo.shape import DISTANCE, LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.views import View
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -20,9 +20,8 @@ from realizer_studio.tracking.landmarks import (
     eye_region,
     landmarks,
 )
-from realizer_studio.tracking.network import TrackingError
+from realizer_studio.tracking.network import Region, TrackingError
 from realizer_studio.tracking.pictures import read_picture
-from realizer_studio.tracking.region import Region
 from realizer_studio.tracking.regressor import stored, upright
 
 if TYPE_CHECKING:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
+import click
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
@@ -17,6 +19,7 @@ from realizer.cli import cli
 from realizer.emotions.archetypes import archetypes
 from realizer.face.deform import deform
 from realizer.face.load import load_face
+from realizer_studio.cli.track import Numbers, follow_markers, marker_settings
 from tests.mesh_features import points_of
 from tests.painted import acted as moved
 from tests.painted import plain, truth
@@ -245,3 +248,37 @@ def test_track_says_which_marker_option_is_wrong(
     done = run(str(dots), *args, "-o", str(tmp_path / "x.csv"))
     assert done.exit_code == 2, done.output
     assert said in " ".join(done.stderr.split())
+
+
+NONE = {"markers": None, "marker_colour": (), "marker_at": (), "layout": None, "region": None}
+
+
+def test_numbers_are_pixels_with_commas() -> None:
+    assert Numbers("X,Y").convert("12, 7", None, None) == (12, 7)
+    for text in ("1", "1,2,3", "a,b", "-1,2", ""):
+        with pytest.raises(click.BadParameter, match=r"wanted X,Y in pixels"):
+            Numbers("X,Y").convert(text, None, None)
+
+
+@pytest.mark.parametrize(
+    ("chosen", "names"),
+    [
+        ({}, None),
+        ({"markers": "green, blue"}, ["green", "blue"]),
+        ({"marker_colour": ("120,50,50",)}, ["120,50,50"]),
+        ({"markers": "red", "marker_at": ((5, 5),)}, ["red", "hue 239"]),
+    ],
+)
+def test_look_of_has_the_colours(tmp_path: Path, chosen: dict[str, Any], names: list[str] | None) -> None:
+    Image.new("RGB", (10, 10), (20, 20, 200)).save(tmp_path / "blue.png")
+    look = marker_settings(tmp_path / "blue.png", NONE | chosen, None)
+    assert (None if look is None else [colour.name for colour in look.colours]) == names
+
+
+def test_follow_reads_the_film(tmp_path: Path) -> None:
+    for k, picture in enumerate(plain(truth("ada", moved(3)))):
+        picture.image.save(tmp_path / f"{k}.png")
+    look = marker_settings(tmp_path, NONE | {"markers": "green,blue"}, 0)
+    assert look is not None
+    with click.Context(click.Command("track")):
+        assert follow_markers(tmp_path, look, 10).pixels.shape == (3, 31, 2)

@@ -8,7 +8,7 @@ from PIL import Image
 
 from realizer_studio.tracking.detector import detect
 from realizer_studio.tracking.landmarks import landmarks
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region
 from tests.portraits import LITERT, pixels_of, portrait
 
 pytestmark = [LITERT, pytest.mark.gl("onboard")]

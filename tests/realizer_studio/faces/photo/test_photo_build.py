@@ -14,7 +14,7 @@ from realizer.core.errors import FaceError
 from realizer_studio.faces.photo import photo_build as build
 from realizer_studio.faces.photo.photo_build import build_from_photographs, recipe_of
 from realizer_studio.faces.photo.views import View
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region
 from realizer_studio.tracking.regressor import stored
 from tests.portraits import LITERT, portrait
 

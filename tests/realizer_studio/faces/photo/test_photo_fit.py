@@ -13,7 +13,7 @@ from realizer_studio.faces.eyeball import LIMBUS
 from realizer_studio.faces.photo.photo_fit import IRIS, VISIBLE_IRIS, fit_person, outline
 from realizer_studio.faces.photo.shape import DISTANCE, LandmarkAnchors, Pose, Sliders
 from realizer_studio.faces.photo.views import View
-from realizer_studio.tracking.region import Region
+from realizer_studio.tracking.network import Region
 
 SCALE = 3000.0  # pixels a metre
 
