@@ -160,7 +160,7 @@ class StateMessage(Reply):
 
 ErrorCode = Literal[
     "bad-json", "too-large", "unsupported", "invalid", "version", "clip", "face", "voice", "render", "rate",
-    "token", "journal", "edit", "conflict",
+    "token", "journal", "edit", "conflict", "internal",
 ]  # fmt: skip
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING
 
 from realizer.server.journal.checkpoint import Checkpoint
@@ -69,6 +70,25 @@ class SessionJournal:
         self._recorder = recorder
         self._on_stopped = on_stopped
         self._follow: Callable[[], bool] | None = follow
+
+    def go_on(self, checkpoint: Checkpoint, connections: Collection[int]) -> None:
+        """Go on with the parts of a session that were made anew."""
+        self.checkpoint, self._connections = checkpoint, connections
+
+    def saved(self) -> SavedSession | None:
+        """Return what the journal has of the session; None if it has nothing, or cannot be read."""
+        try:
+            return None if self._journal is None else self._journal.claim(self._session)
+        except JournalError as error:
+            log.error("session %s: %s", self._session, error)
+            return None
+
+    def leave_out(self, entries: Mapping[int, Entry]) -> None:
+        """Replace entries by their index, so that no later replay fails at them."""
+        for index, entry in entries.items():
+            with contextlib.suppress(JournalError):
+                if self._journal is not None:
+                    self._journal.replace(self._session, index, entry)
 
     def begin(self, epoch: float) -> None:
         """Add a new session; raises JournalError if the journal cannot be written."""

@@ -24,6 +24,7 @@ from realizer.server.documents.document_queue import block_id_of
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Entry, Journal, JournalError, TakenOver, journal_at
 from realizer.server.journal.entry import NOTE
+from realizer.server.journal.memory_journal import MemoryJournal
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.session.effects import Speak
 from realizer.server.session.query_handlers import capabilities_of
@@ -47,6 +48,7 @@ class SessionFactory:
 
     def __init__(self, settings: Settings, metrics: Metrics) -> None:
         self.journal: Journal | None = None
+        self._memory = MemoryJournal()
         self.ending = False
         self.overload = Overload()
         self._settings = settings
@@ -96,7 +98,7 @@ class SessionFactory:
         """
         epoch = time.time()
         session = self._session(id, now, named=named, epoch=epoch)
-        journal = self.journal if named else None
+        journal = self.journal if named and self.journal is not None else self._memory
         session.journal.open(journal, self._recorder, on_stopped=self._on_recording_stopped)
         try:
             session.journal.begin(epoch)

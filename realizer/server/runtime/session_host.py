@@ -4,9 +4,12 @@ import asyncio
 import contextlib
 import itertools
 import logging
+import secrets
 from functools import partial
 
+from realizer.core.errors import RealizerError
 from realizer.core.settings import Settings
+from realizer.protocol.messages.replies import ErrorMessage
 from realizer.server.documents.limits import memory
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import TakenOver
@@ -21,7 +24,7 @@ from realizer.server.runtime.session_registry import (
     Visitor,
     worker_of,
 )
-from realizer.server.session.effects import Close
+from realizer.server.session.effects import Close, Send
 from realizer.server.session.session import Session
 from realizer.server.transports.transport import Outbound
 
@@ -31,6 +34,7 @@ DRAIN_STEP = 0.05  # s; how often `drain` checks whether everything has ended
 DEGRADED = "degraded"  # status of `/healthz` while the process is overloaded
 EXPIRY_INTERVAL = 5.0  # s; how often expired sessions and due checkpoints are looked for
 MOST_WAITING = 100  # messages to a session that plans; then its clients are read more slowly
+FAILING, MOST_FAILURES = 10.0, 5  # s; a session that fails more often in that time ends
 CONGESTION = 0.02  # s; how often a client looks whether its session can take messages again
 
 
@@ -167,7 +171,7 @@ class SessionHost:
             return False
         self.metrics.counts["messages"] += 1
         began = self._loop.time()
-        self._loop.call(session, partial(self._receive, session, number, message))
+        self._loop.call(session, partial(self._receive, session, number, message), number)
         self._loop.report_slow_step(began, f"a message of {len(message)} characters", session, [number])
         return True
 
@@ -265,10 +269,37 @@ class SessionHost:
         self._registry.end(session)
         self._loop.apply_effects(session)
 
-    def _fail(self, session: Session) -> None:
-        log.exception("session %s ends: it failed", session.id)
+    def _fail(self, session: Session, sender: int | None) -> None:
+        """Recover a session in which an exception was raised: what it accepted plays on, its clients stay.
+
+        The fault costs the message that was handled: its sender gets an error, with an id that is in the log.
+        """
+        from realizer.server.journal.recovery import recover
+
+        fault = f"internal error {secrets.token_hex(4)}"
+        log.exception("session %s: %s", session.id, fault)
         self.metrics.counts["failures"] += 1
-        self._end(session, 1011, "internal error")  # in the journal, too: a restored session would fail again
+        words = f"{fault}: this was not handled; the log of the service says why"
+        if sender is not None and (client := self._clients.get(sender)) is not None:
+            client.send(ErrorMessage(code="internal", message=words).text())
+        if session.closed:
+            return
+        now = self._loop.time()
+        session.failures = [at for at in session.failures if at > now - FAILING] + [now]
+        self._loop.run(session, [effect for effect in session.take_effects() if isinstance(effect, Send)])
+        saved = session.journal.saved()
+        try:
+            if saved is None or len(session.failures) > MOST_FAILURES:
+                raise RealizerError("it has failed again and again" if saved else "it accepted too much")
+            unanswered, left_out = recover(
+                session, saved, self._loop.speak, now, words, failed_before=len(session.failures) > 1
+            )
+        except Exception as error:
+            log.error("session %s ends: %s", session.id, error)
+            self._end(session, 1011, "internal error")
+            return
+        session.journal.leave_out(left_out)
+        self._loop.run(session, unanswered)
 
     # every few seconds --------------------------------------------------------------------------
 

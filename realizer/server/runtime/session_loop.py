@@ -7,6 +7,7 @@ from functools import partial
 from typing import TypeVar
 
 from realizer.core import work
+from realizer.core.errors import RealizerError
 from realizer.core.work import FairPool
 from realizer.server.http.metrics import Metrics
 from realizer.server.runtime.edit_folder import save
@@ -17,6 +18,7 @@ from realizer.server.session.effects import Close, Draw, Effect, Look, MoveConne
 from realizer.server.session.session import Session
 from realizer.server.streams.broadcast import Overload
 from realizer.server.transports.transport import Outbound
+from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +35,8 @@ class SessionLoop:
     Args:
         clients: the ways out, by number of connection.
         move: moves connections between sessions, and returns the effects that are left.
-        on_failure: called with a session that has raised an exception, from its handler.
+        on_failure: called in the handler of an exception that a session has raised, with the connection whose
+            message it was handling, or None.
     """
 
     def __init__(
@@ -43,7 +46,7 @@ class SessionLoop:
         metrics: Metrics,
         overload: Overload,
         move: Callable[[Session, list[Effect], float], list[Effect]],
-        on_failure: Callable[[Session], None],
+        on_failure: Callable[[Session, int | None], None],
     ) -> None:
         self.engines = engines
         self.is_closed = False
@@ -78,10 +81,13 @@ class SessionLoop:
 
     # calls and effects --------------------------------------------------------------------------
 
-    def call(self, session: Session, function: Callable[[], None]) -> bool:
+    def call(self, session: Session, function: Callable[[], None], sender: int | None = None) -> bool:
         """Call a function that changes a session, and carry out the effects.
 
         If it takes long, or if other calls of the session have not ended, it ends later.
+
+        Args:
+            sender: the connection whose message the function handles.
 
         Returns:
             Whether it has ended.
@@ -91,7 +97,7 @@ class SessionLoop:
             try:
                 function()
             except Exception:
-                self._on_failure(session)
+                self._on_failure(session, sender)
             self.apply_effects(session)
 
         self._calls.call(session, step)
@@ -104,6 +110,10 @@ class SessionLoop:
     def count_waiting(self, session: Session) -> int:
         """Return how many calls of a session wait."""
         return self._calls.count_waiting(session)
+
+    def speak(self, order: Speak) -> Utterance | RealizerError:
+        """Synthesize speech in a thread, while the present call of a session waits."""
+        return self._calls.wait_for(self.engines.speak, order)
 
     def cancel(self, session: Session) -> None:
         """Drop the calls of a session that have not ended."""
@@ -121,29 +131,36 @@ class SessionLoop:
 
     def run(self, session: Session, effects: Iterable[Effect]) -> None:
         """Carry out effects of a session."""
-        engines = self.engines
         for effect in work.counted(effects, 5):
-            match effect:
-                case Send(connection, data):
-                    if (client := self._clients.get(connection)) is not None:
-                        client.send(data)
-                case Speak():
-                    self._submit(session, engines.speech_pool, engines.speak, effect, session.on_speech)
-                case Draw():
-                    self._submit(session, engines.render_pool, engines.draw, effect, session.on_picture)
-                case Look():
-                    self._submit(session, engines.tracking_pool, engines.look, effect, session.on_sight)
-                case Write():
-                    self._submit(
-                        session,
-                        engines.file_pool,
-                        save,
-                        effect,
-                        lambda id, reply, now: session.connections.reply(id, reply),
-                    )
-                case Close(connection, code, reason):
-                    if (client := self._clients.get(connection)) is not None:
-                        client.disconnect(code, reason)
+            try:
+                self._carry_out(session, effect)
+            except Exception:  # one client, voice or picture: the others get theirs
+                log.exception("session %s: %s failed", session.id, type(effect).__name__)
+                self._metrics.counts["failures"] += 1
+
+    def _carry_out(self, session: Session, effect: Effect) -> None:
+        engines = self.engines
+        match effect:
+            case Send(connection, data):
+                if (client := self._clients.get(connection)) is not None:
+                    client.send(data)
+            case Speak():
+                self._submit(session, engines.speech_pool, engines.speak, effect, session.on_speech)
+            case Draw():
+                self._submit(session, engines.render_pool, engines.draw, effect, session.on_picture)
+            case Look():
+                self._submit(session, engines.tracking_pool, engines.look, effect, session.on_sight)
+            case Write():
+                self._submit(
+                    session,
+                    engines.file_pool,
+                    save,
+                    effect,
+                    lambda id, reply, now: session.connections.reply(id, reply),
+                )
+            case Close(connection, code, reason):
+                if (client := self._clients.get(connection)) is not None:
+                    client.disconnect(code, reason)
 
     def _submit(
         self,
@@ -184,7 +201,8 @@ class SessionLoop:
         try:
             due = session.ticker.send_ready(session.clock.read(now))
         except Exception:
-            self._on_failure(session)
+            self._on_failure(session, None)
+            self.apply_effects(session)
             return
         if due is None:
             self.call(session, partial(self._work, session, now, read_documents=False))

@@ -2,7 +2,7 @@
 
 import zlib
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import NamedTuple
@@ -11,6 +11,7 @@ from bml_schema import Feedback, parse_feedback
 from realizer.core import work
 from realizer.protocol.messages.common import Reply
 from realizer.protocol.messages.replies import Gap
+from realizer.protocol.messages.requests import Subscribe
 from realizer.server.session.effects import Close, Effect, RenderOptions, Send
 from realizer.server.streams.audio_stream import AudioSubscription
 from realizer.server.streams.frame_windows import FrameSubscription, FrameTimeline
@@ -196,6 +197,7 @@ class Connection:
     Attributes:
         feedback: filter of its feedback; None for no feedback.
         subscriptions: (stream, character, view) -> subscription.
+        requests: the messages that asked for them.
     """
 
     id: int
@@ -203,7 +205,9 @@ class Connection:
     is_slow: bool = False  # whether more than SLOW bytes are unsent
     dropped: int = 0  # number of frames, pictures and sound packets it missed because it was slow
     subscriptions: dict[tuple[str, str | None, str | None], Subscription] = field(default_factory=dict)
+    requests: dict[tuple[str, str | None, str | None], Subscribe] = field(default_factory=dict)
     may_edit: bool = False
+    sent: int = 0  # seq of the newest feedback that was sent to it, or that its filter held back
 
 
 class Connections(dict[int, Connection]):
@@ -213,6 +217,11 @@ class Connections(dict[int, Connection]):
         super().__init__()
         self.log = log
         self.add_effects = add_effects
+
+    def replace(self, others: Mapping[int, Connection]) -> None:
+        """Have these connections instead of the present ones."""
+        self.clear()
+        self.update(others)
 
     @property
     def has_slow(self) -> bool:
@@ -243,6 +252,11 @@ class Connections(dict[int, Connection]):
         for connection in self.values():
             self._send_feedback(connection, texts)
 
+    def send_unsent_feedback(self) -> None:
+        """Send the feedback that was numbered, and could not be sent."""
+        for connection in self.values():
+            self._send_feedback(connection, self.log.since(connection.sent + 1))
+
     def send_missed_feedback(self, id: int, seen: int) -> None:
         """Send the feedback after `seen`, and `gap` first if some of it is not stored or never existed."""
         first = self.log.first
@@ -252,6 +266,7 @@ class Connections(dict[int, Connection]):
         self._send_feedback(self[id], self.log.since(seen + 1))
 
     def _send_feedback(self, connection: Connection, texts: list[str]) -> None:
+        connection.sent = self.log.newest
         if (filter := connection.feedback) is not None:
             self.add_effects(
                 [Send(connection.id, text) for text in work.counted(texts) if filter.accepts(text)]

@@ -9,7 +9,7 @@ import json
 import logging
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from bml_schema import BMLError, WarningFeedback
 from bml_schema.encodings import decode
@@ -44,6 +44,18 @@ from realizer.speech.utterance import Utterance
 log = logging.getLogger(__name__)
 
 
+class Remains(NamedTuple):
+    """What clients need of the parts of a session that has failed."""
+
+    clock: SessionClock
+    log: FeedbackLog
+    connections: dict[int, Connection]
+    journal: SessionJournal
+    tracked: TrackedFaces
+    broadcast: Broadcast
+    is_ending: bool
+
+
 class Session:
     """A clock, characters, blocks, a scene and a feedback log, and the connections that share them.
 
@@ -76,16 +88,22 @@ class Session:
     ) -> None:
         self.id = id
         self.settings = settings
-        self.clock = SessionClock(now)
         self.named = named
         self.closed = False
         self.is_ending = False
         self.empty_since: float | None = now
+        self.failures: list[float] = []  # when it was recovered lately, on the host's clock
+        self._scene, self._capabilities, self._epoch = scene, capabilities or {}, epoch
+        self._effects: list[Effect] = []
+        self._make_parts(now, log or FeedbackLog(epoch))
+
+    def _make_parts(self, now: float, log: FeedbackLog) -> None:
+        id, settings = self.id, self.settings
+        self.clock = SessionClock(now)
         self.faces = CharacterFaces(settings)
         self.clips = AudioClips()
-        self._effects: list[Effect] = []
         self.player = Player(
-            settings.play_options(scene),
+            settings.play_options(self._scene),
             kinds=KINDS,
             clips=self.clips.recordings,
             face_inputs=lambda index: self.faces.of(index).inputs,
@@ -93,7 +111,7 @@ class Session:
         )
         self.broadcast = Broadcast(self.player, self.faces)
         self.submission = Submission(id, settings, self.player, self._effects.extend)
-        self.feedback_log = log or FeedbackLog(epoch)
+        self.feedback_log = log
         self.connections = Connections(self.feedback_log, self._effects.extend)
         checkpoint = Checkpoint(self.player, self.faces, self.clips, self.submission, self.feedback_log)
         self.journal = SessionJournal(id, checkpoint, self.connections, self.hand_over)
@@ -102,7 +120,7 @@ class Session:
         )
         self.tracked = TrackedFaces(self.player.cast, self.connections, self._handle)
         self.queries = QueryHandlers(
-            id, settings, capabilities or {}, self.player, self.faces, self.submission, self.connections
+            id, settings, self._capabilities, self.player, self.faces, self.submission, self.connections
         )
         self._controls = ControlHandlers(
             self.player,
@@ -128,7 +146,8 @@ class Session:
             self._effects.append(Close(connection, 1012, f"session {self.id} has ended: reconnect"))
             return
         may_edit = may_edit and self.settings.edit is not None
-        self.connections[connection] = Connection(connection, may_edit=may_edit)
+        sent = self.feedback_log.newest
+        self.connections[connection] = Connection(connection, may_edit=may_edit, sent=sent)
         if not self.journal.note(self.clock.read(now), "join", connection):
             return
         self.empty_since = None
@@ -294,6 +313,39 @@ class Session:
         closing = [Close(connection, 1012, str(error)) for connection in self.connections]
         self.close()
         self._effects += closing
+
+    def start_anew(self) -> Remains:
+        """Make all parts anew, at 0 of a clock, for a replay; return what clients need of the old ones."""
+        remains = Remains(
+            self.clock, self.feedback_log, dict(self.connections), self.journal, self.tracked, self.broadcast,
+            self.is_ending,
+        )  # fmt: skip
+        self._effects.clear()
+        self.is_ending = False
+        self._make_parts(0.0, FeedbackLog(self._epoch))
+        return remains
+
+    def continue_from(self, remains: Remains, now: float) -> None:
+        """Go on after a replay with the clients, the clock, the feedback log and the journal of before.
+
+        Feedback that the replay has made beyond what was sent is sent; subscriptions go on where they were.
+        """
+        self.clock.opened, self.is_ending = remains.clock.opened, remains.is_ending
+        t, log, replayed = self.clock.read(now), remains.log, self.feedback_log
+        texts = replayed.since(log.newest + 1)
+        log.restore(max(log.newest, replayed.newest), texts, t)
+        self.feedback_log = self.connections.log = self.journal.checkpoint.feedback_log = log
+        remains.journal.go_on(self.journal.checkpoint, self.connections)
+        self.journal = remains.journal
+        self.tracked.cameras = remains.tracked.cameras
+        self.broadcast.counts = self.submission.counts = remains.broadcast.counts
+        self.broadcast.overload = remains.broadcast.overload
+        self.connections.replace(remains.connections)
+        for connection in self.connections.values():
+            self.subscriptions.renew(connection, t)
+        self.broadcast.set_subscribers(self.connections.values())
+        self.take_effects()  # the clients know all of that
+        self.connections.send_unsent_feedback()
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""

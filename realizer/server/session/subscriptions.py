@@ -75,7 +75,7 @@ class Subscriptions:
                 new, fields = self._video(connection, message, index, old, t)
             else:
                 new, fields = self._frames(message, index, old, t)
-            connection.subscriptions[key] = new
+            connection.subscriptions[key], connection.requests[key] = new, message
         fields |= {"stream": stream, "encoding": encoding, "character": message.character}
         self.connections.reply(connection.id, Subscribed(**fields))
 
@@ -84,6 +84,16 @@ class Subscriptions:
         if message.stream == "feedback":
             connection.feedback = None
         connection.subscriptions.pop(self._key(message), None)
+        connection.requests.pop(self._key(message), None)
+
+    def renew(self, connection: Connection, t: float) -> None:
+        """Subscribe a connection again to its streams, of parts that were made anew, where it had got to."""
+        olds, requests = dict(connection.subscriptions), dict(connection.requests)
+        connection.subscriptions.clear()
+        for key, message in requests.items():
+            if key in olds:
+                self.subscribe(connection, message, t)
+                _go_on(connection.subscriptions[key], olds[key])
 
     def announce_face_change(self, index: int) -> None:
         """Send the new scale of a character's meshes to their subscribers."""
@@ -205,6 +215,15 @@ def _check_options(message: Subscribe) -> None:
         if getattr(message, name) != Subscribe.model_fields[name].default:
             names = " or ".join(row.name for row in STREAMS.values() if name in row.options)
             raise FieldError(name, f"wanted the stream {names}, got {message.stream}")
+
+
+def _go_on(new: Subscription, old: Subscription) -> None:
+    """Let a subscription begin where another one was; rows that were sent ahead are sent again."""
+    if isinstance(new, AheadSubscription) and isinstance(old, AheadSubscription):
+        new.takes_back = old.takes_back or old.next > old.final
+        new.next = new.final = max(new.final, old.final)
+    elif not isinstance(new, ScheduleSubscription) and not isinstance(old, ScheduleSubscription):
+        new.next = max(new.next, old.next)
 
 
 def _index_of_view(connection: Connection, old: Subscription | None) -> int:

@@ -274,7 +274,7 @@ def test_serve_names_what_a_transport_needs_in_one_sentence(tmp_path: Path) -> N
     assert error == "realizer: --stomp needs stomp.py: pip install 'bml-realizer[stomp]'\n"
 
 
-def test_serve_ends_only_the_session_that_fails(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
+def test_serve_ends_no_session_when_a_message_fails(monkeypatch: pytest.MonkeyPatch, caplog) -> None:
     real = Session.receive
 
     def broken(session: Session, connection: int, message: str | bytes, now: float) -> None:
@@ -287,13 +287,14 @@ def test_serve_ends_only_the_session_that_fails(monkeypatch: pytest.MonkeyPatch,
     async def test(server: Server) -> None:
         async with connect(server.url) as other, connect(server.url) as failing:
             await failing.send("<boom/>")
-            await failing.wait_closed()
-            assert failing.close_code == 1011
+            assert json.loads(await failing.recv())["code"] == "internal"
+            await failing.send('<bml id="a"><wait id="w" duration="0.05"/></bml>')
+            await until(failing, "a:end")
             await other.send('<bml id="b"><wait id="w" duration="0.05"/></bml>')
             await until(other, "b:end")
 
     serving(test)
-    assert "it failed" in caplog.text
+    assert "internal error" in caplog.text
 
 
 def test_serve_plays_the_blocks_of_a_client_that_keeps_sending() -> None:

@@ -13,7 +13,6 @@ from websockets.exceptions import ConnectionClosed
 
 from realizer.core.errors import FaceError
 from realizer.core.settings import Settings
-from realizer.server.documents.document_queue import Submission
 from realizer.server.http.metrics import Metrics
 from realizer.server.journal import Journal, JournalError, TakenOver, journal_at
 from realizer.server.runtime import session_factory
@@ -22,7 +21,7 @@ from realizer.server.runtime.session_host import SessionHost
 from realizer.server.runtime.session_registry import JoinError
 from realizer.server.serve import Server
 from realizer.server.session.session import Session
-from tests.feedback_log import read_feedback, seq_numbers
+from tests.feedback_log import read_feedback
 from tests.realizer.server.runtime.test_session_host import Loop, subscribed
 from tests.waiting import LIMIT
 
@@ -70,33 +69,6 @@ def test_factory_restores_nothing_without_an_entry_in_the_journal(kept: Settings
             await factory.load()
             assert await factory.restore("nobody", 0, speak) is None
             factory.close()
-
-    asyncio.run(run())
-
-
-def test_factory_begins_a_session_anew_after_an_internal_error(
-    monkeypatch: pytest.MonkeyPatch, kept: Settings
-) -> None:
-    put = Submission.enqueue
-
-    def faulty(submission: Submission, text: str, *sender: int) -> None:
-        if "fault" in text:
-            raise ZeroDivisionError
-        put(submission, text, *sender)
-
-    monkeypatch.setattr(Submission, "enqueue", faulty)
-
-    async def run() -> None:
-        async with asyncio.timeout(LIMIT), Server(kept) as server:
-            async with connect(f"{server.url}?session=s") as client:
-                await client.send('<bml id="fault"/>')
-                with pytest.raises(ConnectionClosed) as closed:
-                    await drained(client)
-                assert closed.value.rcvd is not None
-                assert closed.value.rcvd.code == 1011
-            async with connect(f"{server.url}?session=s") as client:
-                await client.send(NEXT)
-                assert seq_numbers(await read_feedback(client, "b:end"))[0] == 1
 
     asyncio.run(run())
 
