@@ -10,6 +10,7 @@ from typing import Any
 
 from lxml import etree
 
+from bml_schema.bare_signs import mend
 from bml_schema.canonical import xml_parser
 from bml_schema.dialects.intentions import FML_WRAPPER, fml_of
 from bml_schema.dialects.recognition import has_words_of_dialects, is_draft
@@ -373,6 +374,9 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
     try:
         root = element(data, lines_before=line - 1, block=id)
     except BMLSyntaxError:
+        mended, note = ("", "") if reader.strict_bml else mend(document)
+        if note:
+            data, notes = mended.encode(), (*notes, note)
         found = None if reader.strict_bml else read_undeclared(data, reader.vocabulary)
         if found is None:
             raise

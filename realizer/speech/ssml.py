@@ -45,6 +45,7 @@ CLOCK = re.compile(r"\s*\+?(\d+(?:\.\d+)?|\.\d+)\s*(ms|s)\s*")
 
 PICTURES = re.compile(
     "[\U0001f000-\U0001faff\u2600-\u27bf\u2b00-\u2bff\ufe00-\ufe0f\u200d\u20e3\U000e0000-\U000e007f]+"
+    r"|(?<!\S)<3(?=[\s.,!?]|$)"  # a heart
 )
 BEFORE_SIGN = re.compile(r"\s+(?=[.,;!?])")
 MARKUP = re.compile(r"<[^<>]*>")
