@@ -6,10 +6,6 @@
 from __future__ import annotations
 
 import asyncio
-import os
-import re
-import signal
-import subprocess
 import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -28,7 +24,7 @@ from realizer.client import connect
 from realizer.protocol.wire import PictureFrame
 from realizer.server.http.webrtc import QUALITY
 from tests.browser.test_page import ARGUMENTS, CHROMIUM, PATIENCE, browser, pytestmark
-from tests.waiting import LIMIT
+from tests.programs import serving
 
 __all__ = ["browser", "pytestmark"]
 
@@ -78,27 +74,9 @@ KEEP = """globalThis.RTCPeerConnection = class extends RTCPeerConnection {
 
 @contextmanager
 def application() -> Iterator[str]:
-    """The address of the application under uvicorn."""
-    program = (
-        "import sys, uvicorn; sys.stderr = sys.stdout;"
-        "uvicorn.run('realizer.asgi:app', port=0, timeout_graceful_shutdown=5)"
-    )
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "REALIZER_VOICE": "silent", "REALIZER_IDLE": "0"}
-    process = subprocess.Popen(
-        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, env=environment
-    )
-    assert process.stdout is not None
-    found = None
-    while found is None:
-        line = process.stdout.readline()
-        assert line, "the application ended before it listened"
-        found = re.search(r"http://127\.0\.0\.1:\d+", line)
-    try:
-        yield found.group()
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.stdout.close()
-        process.wait(LIMIT)
+    """The address of a service whose faces do not move by themselves."""
+    with serving("--no-idle") as (address, _):
+        yield address.replace("ws:", "http:").removesuffix("/ws")
 
 
 def beeps() -> bytes:

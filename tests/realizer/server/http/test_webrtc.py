@@ -15,9 +15,7 @@ pytest.importorskip("aiortc", reason="needs the webrtc extra")
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
 from realizer.client import connect
-from realizer.core.settings import Settings
 from realizer.server.http import webrtc
-from realizer.server.http.app import create_app
 from realizer.server.http.webrtc import offer_of, video_fields
 from realizer.server.runtime.session_registry import JoinError
 from tests.realizer.server.http.conftest import LIMIT, Served
@@ -27,8 +25,8 @@ RATE = 16000
 
 
 @pytest.fixture(scope="module")
-def app(serve) -> Iterator[Served]:
-    with serve(create_app(Settings(voice="silent", idle=False))) as served:
+def app(open_service) -> Iterator[Served]:
+    with open_service(idle=False) as served:
         yield served
 
 
@@ -156,8 +154,8 @@ def test_webrtc_refuses_more_peers_than_it_can_encode(app, monkeypatch) -> None:
     assert refusal(app, "/sessions/s/webrtc") == (503, "0 WebRTC peers are connected: wanted fewer")
 
 
-def test_webrtc_counts_the_connections_of_an_address(serve) -> None:
-    with serve(create_app(Settings(voice="silent", max_connections=1))) as app:
+def test_webrtc_counts_the_connections_of_an_address(open_service) -> None:
+    with open_service(max_connections=1) as app:
 
         async def act(peer: RTCPeerConnection) -> tuple[int, str]:
             return await asyncio.to_thread(app.error, "POST", "/sessions/s/webrtc", "v=0")
@@ -166,8 +164,8 @@ def test_webrtc_counts_the_connections_of_an_address(serve) -> None:
         assert (status, words[:18]) == (429, "1 connections from")
 
 
-def test_webrtc_needs_the_token_of_the_service(serve) -> None:
-    with serve(create_app(Settings(voice="silent", token="secret"))) as app:
+def test_webrtc_needs_the_token_of_the_service(open_service) -> None:
+    with open_service(token="secret") as app:
         assert refusal(app, "/sessions/s/webrtc")[0] == 401
         assert app("GET", "/webrtc.html")[0] in (200, 404)  # the page, if it was bundled, is public
         heard = with_peer(
@@ -176,9 +174,9 @@ def test_webrtc_needs_the_token_of_the_service(serve) -> None:
         assert heard.sample_rate == 48000
 
 
-def test_webrtc_gives_up_a_peer_that_never_connects(serve, monkeypatch) -> None:
+def test_webrtc_gives_up_a_peer_that_never_connects(open_service, monkeypatch) -> None:
     monkeypatch.setattr(webrtc, "PATIENCE", 0.05)
-    with serve(create_app(Settings(voice="silent"))) as app:
+    with open_service() as app:
         path = "/sessions/s/webrtc"
         assert asyncio.run(_offer_and_leave(app, path)) == 201
         wait_until_none_is_left(app)
