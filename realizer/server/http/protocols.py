@@ -20,7 +20,11 @@ from realizer.server.transports.rate_limiter import UNIT, RateLimiter
 
 GOODBYE = 2.0  # s; a client that has not answered a close frame by then is gone
 OPENING = 10.0  # s; time for the head of a request, and for some progress of an answer
-SLICE = 4 * 1024  # bytes that are parsed before others have their turn: 3 ms of empty frames
+# Bytes that are parsed before others have their turn: 3 ms of empty frames, or 2 ms of chunks of a byte.
+SLICE, HTTP_SLICE = 4 * 1024, 1024
+# A connection may send so many parts of requests, and one more for so many bytes: a body in chunks of a byte
+# takes a hundred times as long to parse as other bodies, also after its client has gone.
+FEW_PARTS, LEAST_PART = 250, 8
 # In the extensions of an ASGI scope: an `Output`, by which the application sends without a task.
 EXTENSION = "realizer.output"
 
@@ -99,8 +103,8 @@ class Connection(asyncio.Protocol):
         """Parse a slice of what has come; read more when all of it is parsed and the rate allows it."""
         self._next = None
         if self._unread and not self._is_paused:
-            part, self._unread = self._unread[:SLICE], self._unread[SLICE:]
             protocol, before = self._protocol, self._protocol.parts
+            part, self._unread = self._unread[: protocol.slice], self._unread[protocol.slice :]
             protocol.data_received(part)
             count = protocol.parts - before + len(part) / UNIT
             pause = self._limiter.wait(self._loop.time(), count)
@@ -161,9 +165,12 @@ class HttpProtocol(H11Protocol):
         parts: how many parts of requests have come.
     """
 
+    slice = HTTP_SLICE
+
     def __init__(self, connection: Connection, **named: Any) -> None:
         super().__init__(**named)
         self._connection = connection
+        self._bytes = 0
         self.conn: _HttpParser = _HttpParser(h11.SERVER)
 
     @property
@@ -178,6 +185,10 @@ class HttpProtocol(H11Protocol):
     def data_received(self, data: bytes) -> None:
         self.server_state.default_headers = [(b"date", formatdate(usegmt=True).encode())]
         super().data_received(data)
+        self._bytes += len(data)
+        if self.parts > FEW_PARTS + self._bytes / LEAST_PART:
+            self._connection.counts["http_errors"] += 1
+            self.transport.abort()
 
     def warn(self, notice: str) -> None:
         """Say nothing: the client waits for its answer."""
@@ -204,6 +215,7 @@ class SocketProtocol(WebSocketsSansIOProtocol):
         parts: how many frames have come.
     """
 
+    slice = SLICE
     warn: Callable[[str], None] = staticmethod(lambda notice: None)
 
     def __init__(self, **named: Any) -> None:

@@ -285,6 +285,17 @@ def test_connection_ends_if_its_answer_is_not_read(monkeypatch: pytest.MonkeyPat
     asyncio.run(run())
 
 
+@pytest.mark.parametrize(("size", "is_read"), [(1, False), (8, True)])
+def test_protocol_ends_a_body_in_tiny_chunks(size: int, is_read: bool) -> None:
+    chunk = f"{size}\r\n{size * 'x'}\r\n".encode()
+    head = b"POST /check HTTP/1.1\r\nHost: x\r\nConnection: close\r\nTransfer-Encoding: chunked\r\n\r\n"
+    try:
+        (answer,) = answers(head + 1_500 * chunk + b"0\r\n\r\n")
+    except ConnectionError:
+        answer = b""
+    assert answer.startswith(b"HTTP/1.1 200 ") is is_read
+
+
 @pytest.mark.parametrize("head", ["POST /ws HTTP/1.1", "GET /ws HTTP/1.1\r\nContent-Length: 5"])
 def test_protocol_refuses_a_websocket_by_another_method_or_with_a_body(head: str) -> None:
     (answer,) = answers(UPGRADE.replace(b"GET /ws HTTP/1.1", head.encode()))
