@@ -413,6 +413,7 @@ KINDS: dict[str, Callable[[Author, str], Tag]] = {
     "activate": lambda a, id: Tag("bmla", "activate", (("target", a.pick(list(a.known.blocks))),)),
     "parametervaluechange": _change,
     "audiofile": _with("audiofile", "bmlt", fileName=("no-such.wav",)),
+    "blinkemitter": _with("blinkemitter", "bmlt", avgwaitingtime=("1", "2.5")),
     "facekeyframe": _keys,
 }
 POINTS: dict[str, Sequence[str]] = {
