@@ -302,6 +302,8 @@ class _PlanBuilder:
         stretched = solved({**own.timings, **stretchable})
         if stretched.failed or stretched.fit <= rigid.fit:
             return {}
+        if self.sequences and stretched.released:
+            return {}  # without the sequence, nothing may have to be given up
         points = {b: stretched.times[b] - stretched.times[b][0] for b in stretchable if b in stretched.times}
         natural = {b: np.append(0.0, np.cumsum(own.timings[b].preferred)) for b in points}
         # Some voices have one rate for a whole speech. Of the rates of the stretched gaps, take the one with
