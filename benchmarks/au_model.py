@@ -26,6 +26,7 @@ from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.deform import deform
 from realizer.face.load import folder_of, load_face
+from realizer.face.mesh_geometry import corner_shares, nearest_points
 from realizer.face.model import Face
 from realizer.face.surface import normals
 from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
@@ -110,17 +111,14 @@ def meshes(
 def nearest(triangles: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the distance of points to the nearest of (m, 3, 3) triangles, its index, and weights."""
     from scipy.spatial import cKDTree
-    from trimesh.triangles import closest_point, points_to_barycentric
 
     candidates = cKDTree(triangles.mean(axis=1)).query(at, 24)[1]
-    many = np.repeat(at, candidates.shape[1], axis=0)
-    places = closest_point(triangles[candidates.ravel()], many)
-    off = np.linalg.norm(places - many, axis=1).reshape(candidates.shape)
+    places = nearest_points(triangles[candidates], at)
+    off = np.linalg.norm(places - at[:, None], axis=2)
     best = off.argmin(axis=1)
     row = np.arange(len(at))
     hit = candidates[row, best]
-    share = points_to_barycentric(triangles[hit], places.reshape(*candidates.shape, 3)[row, best])
-    return off[row, best], hit, share
+    return off[row, best], hit, corner_shares(triangles[hit], places[row, best])
 
 
 def masked(face: Face, index: np.ndarray, corners: np.ndarray) -> tuple[Face, dict[str, tuple[int, int]]]:

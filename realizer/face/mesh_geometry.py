@@ -108,18 +108,13 @@ def nearest_vertex(at: Float64, place: Any, part: tuple[int, int]) -> int:
     return first + int(np.argmin(np.linalg.norm(at[first:last] - place, axis=1)))
 
 
-def nearest_points(corners: Float64, at: Float64, units: float = 1.0) -> Float64:
-    """Return the points (n, k, 3) of triangles, whose corners are (n, k, 3, 3), nearest to places (n, 3).
-
-    Args:
-        units: a metre, in which trimesh is asked. Only with FINE is it right at edges; the shapes and fits of
-            the built faces were made with 1, which puts some places up to 0.03 mm off.
-    """
+def nearest_points(corners: Float64, at: Float64) -> Float64:
+    """Return the points (n, k, 3) of triangles, whose corners are (n, k, 3, 3), nearest to places (n, 3)."""
     from trimesh import triangles
 
     closest: Any = triangles.closest_point
-    many = np.repeat(units * at, corners.shape[1], axis=0)
-    return np.asarray(closest(units * corners.reshape(-1, 3, 3), many).reshape(*corners.shape[:3]) / units)
+    many = np.repeat(FINE * at, corners.shape[1], axis=0)
+    return np.asarray(closest(FINE * corners.reshape(-1, 3, 3), many).reshape(*corners.shape[:3]) / FINE)
 
 
 def corner_shares(corners: Float64, at: Float64) -> Float64:

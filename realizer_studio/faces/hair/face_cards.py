@@ -199,7 +199,7 @@ def depths(positions: Float64, at: Float64, triangles: Int32, near: float) -> tu
     valid = np.isfinite(distances[close])
     found = np.where(valid, found[close], found[close, :1])
     close_positions = positions[close]
-    points = nearest_points(corners[found], close_positions, FINE)
+    points = nearest_points(corners[found], close_positions)
     lengths = np.linalg.norm(points - close_positions[:, None], axis=2)
     least = lengths.min(axis=1)
     # All triangles that contain the nearest point, weighted by their angle there.

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realizer.face.mesh_geometry import (
-    FINE,
     components,
     corner_shares,
     edge_graph,
@@ -109,9 +108,19 @@ def test_nearest_points_of_triangles_lie_on_them() -> None:
         [[[0, 0, 0], [0.002, 0, 0], [0, 0.002, 0]], [[0, 0, 0.01], [1, 0, 0.01], [0, 1, 0.01]]]
     )
     at = np.array([[0.0005, 0.0005, 0.001], [-0.001, 0.001, 0.0]])
-    found = nearest_points(np.stack([corners] * 2), at, FINE)
+    found = nearest_points(np.stack([corners] * 2), at)
     assert found[:, 0] == pytest.approx(np.array([[0.0005, 0.0005, 0], [0, 0.001, 0]]), abs=1e-9)
     assert found[0, 1] == pytest.approx([0.0005, 0.0005, 0.01], abs=1e-9)
+
+
+def test_nearest_points_are_right_for_small_triangles_in_metres() -> None:
+    """No other point of a triangle is nearer; those of lids are a fraction of a millimetre wide."""
+    random = np.random.default_rng(0)
+    corners, at = random.uniform(-2e-4, 2e-4, (300, 1, 3, 3)), random.uniform(-2e-4, 2e-4, (300, 3))
+    off = np.linalg.norm(nearest_points(corners, at)[:, 0] - at, axis=1)
+    shares = random.dirichlet((0.5, 0.5, 0.5), 2000)
+    sampled = np.linalg.norm(np.einsum("kc,ncx->nkx", shares, corners[:, 0]) - at[:, None], axis=2)
+    assert (off <= sampled.min(axis=1) + 1e-9).all()
 
 
 def test_corner_shares_give_the_place_back() -> None:
