@@ -48,25 +48,31 @@ def soften_flips(
 ) -> Float64:
     """Return fields that flip no triangle: they are softened together around flipped triangles.
 
+    Where softening does not lead to fewer flips, the fields are returned as they are: it would make lumps.
+
     Args:
         fields: (g, n, 3) metres per metre of FAP; at: (n, 3) metres; triangles: (m, 3).
         plays: amounts (g,) of the fields in metres, signed; the displacement (n, 3) that accompanies them;
             and the cosine of the angle at which a triangle counts as flipped.
         fixed: vertices that keep their displacement.
     """
+
+    def flips_of(fields: Float64, plays: Sequence[tuple[Float64, Any, float]]) -> list[Bool]:
+        return [
+            flipped_triangles(at, at + np.tensordot(amounts, fields, 1) + along, triangles, cosine)
+            for amounts, along, cosine in plays
+        ]
+
     out = fields.copy()
     free = np.ones(len(at), bool)
     free[list(fixed)] = False
     watched = list(plays)
     for _ in range(ROUNDS):
-        flipped = [
-            flipped_triangles(at, at + np.tensordot(amounts, out, 1) + along, triangles, cosine)
-            for amounts, along, cosine in watched
-        ]
+        flipped = flips_of(out, watched)
         bad = np.any(flipped, axis=0)
         if not bad.any():
             if len(watched) == len(plays):
-                break
+                return out
             watched = list(plays)
             continue
         # Combinations without flips are checked again when no others are left.
@@ -83,7 +89,8 @@ def soften_flips(
         if np.abs(step).max(initial=0.0) < MIN_STEP:
             break  # the remaining flips come from coupled movement
         out[:, loose] += step
-    return out
+    before, after = (np.sum(flips_of(some, plays)) for some in (fields, out))
+    return out if after < before else fields
 
 
 def without_flips(

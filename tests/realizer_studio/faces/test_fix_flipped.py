@@ -52,6 +52,14 @@ def test_soften_flips_keeps_sums_of_fields() -> None:
     assert np.allclose(one + other, [1.0, 0, 0])
 
 
+def test_soften_flips_leaves_fields_that_stand_in_the_way_of_one_another() -> None:
+    field = bump(1.6)
+    needs_it = [(np.array([10.0]), 10 * (bump(11) - field), 0.0)]
+    wants_less = [(np.array([2.5]), 0.0, 0.0)]
+    assert not np.array_equal(mended([field], wants_less, [MIDDLE])[0], field)
+    assert np.array_equal(mended([field], wants_less + needs_it, [MIDDLE])[0], field)
+
+
 def test_without_flips_mends_twins_all_lips_and_the_jaw_together() -> None:
     rows = {number: np.zeros((1, 3)) for number in (*JAW, 4, 8, 19, 20, 31, 48)}
     assert _groups(rows) == [
