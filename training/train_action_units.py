@@ -141,9 +141,9 @@ def seen_by(data: Data, arrays: Mapping[str, np.ndarray]) -> Components:
     return Components(np.concatenate(values, axis=1).astype(np.float64), rotations)
 
 
-def train(x: np.ndarray, y: np.ndarray, steps: int) -> list[list[np.ndarray]]:
+def train(x: np.ndarray, y: np.ndarray, steps: int, seed: int) -> list[list[np.ndarray]]:
     """Return the layers of a perceptron by which x gives y; Adam minimises the square of the error."""
-    random = np.random.default_rng(3)
+    random = np.random.default_rng(seed)
     sizes = (x.shape[1], *HIDDEN, y.shape[1])
     layers = [
         [random.normal(0, np.sqrt(2 / a), (a, b)).astype(np.float32), np.zeros(b, np.float32)]
@@ -184,7 +184,7 @@ def applied(layers: list[list[np.ndarray]], x: np.ndarray) -> np.ndarray:
     return x
 
 
-def trained(data: Data, without: list[str], steps: int) -> dict[str, np.ndarray]:
+def trained(data: Data, without: list[str], steps: int, seed: int) -> dict[str, np.ndarray]:
     """Return the arrays of `regressor.stored`, trained on all faces but some."""
     chosen = ~np.isin(data["names"], without)
     arrays = bases(data, chosen)
@@ -201,7 +201,7 @@ def trained(data: Data, without: list[str], steps: int) -> dict[str, np.ndarray]
     neutral = rests(seen.values, data["sittings"], data["neutral"])
     for name, rest in (("against", neutral), ("alone", None)):
         x = inputs(seen, rest)
-        layers = train(x[chosen], wanted[chosen], steps)
+        layers = train(x[chosen], wanted[chosen], steps, seed)
         result, still = applied(layers, x), chosen & data["neutral"]
         if without:
             report(name, result[~chosen], wanted[~chosen], data["neutral"][~chosen])
@@ -252,12 +252,13 @@ def main() -> None:
     )
     parser.add_argument("--sittings", type=int, default=400)
     parser.add_argument("--steps", type=int, default=STEPS)
+    parser.add_argument("--seed", type=int, default=3, help="of the networks")
     parser.add_argument("--without", nargs="*", default=[], help="faces to leave out")
     parser.add_argument("-o", "--output", type=Path, default=WEIGHTS)
     options = parser.parse_args()
     for seed in options.prepare:
         prepare(options.data, seed, options.sittings)
-    arrays = trained(read(options.data), options.without, options.steps)
+    arrays = trained(read(options.data), options.without, options.steps, options.seed)
     np.savez_compressed(options.output, **arrays)
     print(f"{options.output}: {options.output.stat().st_size} bytes")
 

@@ -223,9 +223,9 @@ def tested(layers: Layers, frames: Frames) -> str:
     return ", ".join(found)
 
 
-def train(frames: Frames, out: Path, epochs: int) -> None:
+def train(frames: Frames, out: Path, epochs: int, seed: int) -> None:
     """Train the network and write it."""
-    random, key = np.random.default_rng(2), jax.random.key(2)
+    random, key = np.random.default_rng(seed), jax.random.key(seed)
     weight = frames.share**-RARITY
     weight /= (weight * frames.share).sum()
     sizes = (len(OFFSETS) * BANDS, *HIDDEN, len(frames.share))
@@ -269,11 +269,12 @@ def main() -> None:
     parser.add_argument("files", type=Path, nargs="+", help="from viseme_frames.py")
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="the network")
     parser.add_argument("--epochs", type=int, default=EPOCHS)
+    parser.add_argument("--seed", type=int, default=2, help="of the network and the noise")
     parser.add_argument("--leave-out", default="", help="speakers to measure instead, separated by commas")
     options = parser.parse_args()
     frames = Frames(options.files, [name for name in options.leave_out.split(",") if name])
     print(f"{len(frames.labels) / 6000:.0f} min, shares of the classes {np.round(100 * frames.share, 1)} %")
-    train(frames, options.out, options.epochs)
+    train(frames, options.out, options.epochs, options.seed)
 
 
 if __name__ == "__main__":

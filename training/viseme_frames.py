@@ -86,9 +86,9 @@ def varied(spoken: Spoken, random: np.random.Generator) -> Spoken:
     return Spoken(spoken.speaker, RATE, sound.astype(np.int16), phonemes)
 
 
-def prepare(file: Path, amount: int) -> None:
+def prepare(file: Path, amount: int, seed: int) -> None:
     """Write frames, their classes, the ends of sentences and their speakers."""
-    random = np.random.default_rng(1)
+    random = np.random.default_rng(seed)
     frames, labels, speakers = list[np.ndarray](), list[np.ndarray](), list[str]()
     begin, seconds = time.perf_counter(), 0.0
     for spoken in corpus(amount, random):
@@ -119,8 +119,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("file", type=Path, help="a name that ends with .npz")
     parser.add_argument("--amount", type=int, default=300, help="sentences of each voice")
+    parser.add_argument("--seed", type=int, default=1, help="of texts, rates, pitches and rooms")
     options = parser.parse_args()
-    prepare(options.file, options.amount)
+    prepare(options.file, options.amount, options.seed)
 
 
 if __name__ == "__main__":

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from realizer.core.errors import FaceError
 from realizer.face.deform import deform
-from realizer.face.load import load_face
+from realizer.face.load import folder_of, load_face
 from realizer.face.model import Face
 from realizer_studio.faces.parts import Part
 from realizer_studio.faces.person import person_build as build
@@ -85,3 +88,39 @@ def test_build_face_names_missing_data_and_recipes(tmp_path: Path) -> None:
     (tmp_path / OBJ).touch()
     with pytest.raises(FaceError, match=r"recipe\.toml: wanted a recipe"):
         build.build_face("x", tmp_path, tmp_path / "x")
+
+
+def fields_of(folder: Path) -> dict[int, np.ndarray]:
+    """Return each row of `fields.npz` as (n, 3)."""
+    with np.load(folder / "fields.npz") as stored:
+        rows = np.zeros((len(stored["row"]), len(stored["head"]), 3))
+        of_row = np.repeat(np.arange(len(rows)), np.diff(stored["start"]))
+        rows[of_row, stored["vertex"]] = stored["move"]
+        return dict(zip(stored["row"].tolist(), rows, strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif("REALIZER_HEAD_DATA" not in os.environ, reason="wants the unpacked CC0 head data")
+def test_build_face_makes_the_face_that_ships(tmp_path: Path) -> None:
+    """Processors differ in the last digits: a thousandth of a move, or one of 255 levels, may be another."""
+    shipped, built = folder_of("ada"), tmp_path / "ada"
+    built.mkdir()
+    shutil.copy(shipped / build.RECIPE, built)
+    build.build_face("ada", Path(os.environ["REALIZER_HEAD_DATA"]), built, lambda _: None)
+    for name in ("mesh.npz", "cards.npz"):
+        with np.load(shipped / name) as wanted, np.load(built / name) as made:
+            assert made.files == wanted.files
+            for array in wanted.files:
+                least = 2 if wanted[array].dtype == np.uint8 else 1e-5
+                assert made[array] == pytest.approx(wanted[array], abs=least), array
+    wanted_fields, made_fields = fields_of(shipped), fields_of(built)
+    assert made_fields.keys() == wanted_fields.keys()
+    for number, field in wanted_fields.items():
+        assert np.abs(made_fields[number] - field).max() < 1e-3, number
+    for name in ("albedo", "relief", "surface", "folds"):
+        wanted_map, made_map = (
+            np.asarray(Image.open(folder / f"{name}.webp"), float) for folder in (shipped, built)
+        )
+        assert np.abs(made_map - wanted_map).mean() < 0.1, name
+    for name in ("features.csv", "face.toml"):
+        assert (built / name).read_text("utf-8") == (shipped / name).read_text("utf-8")
