@@ -84,7 +84,7 @@ def _skip_without_gl(request: pytest.FixtureRequest) -> None:
         pytest.skip(missing)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def balls() -> tuple[Any, Any]:
     """A head of three balls, and its normals, as `tests.balls` has it."""
     from tests.balls import face_of_balls

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any
 
 import pytest
 
@@ -17,9 +15,9 @@ from bml_schema import BlockProgress, Feedback, SyncPointProgress, parse_feedbac
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.settings import Settings
 from realizer.server.runtime.session_host import SessionHost
+from tests import virtual_time
 from tests.case_player import MEDIA, Played, play
 from tests.cases import CASES, Case, LogLine, log_lines
-from tests.realizer.server.runtime.test_session_host import Loop
 
 EXACT = 1e-3  # s; feedback is rounded to that
 AFTER = 1.0  # s after the last message of all cases
@@ -77,16 +75,6 @@ def is_in_order(live: list[Feedback]) -> bool:
     return times == sorted(times)
 
 
-def called_at_once(pool: object, function: Any, *arguments: Any, **named: Any) -> Future[Any]:
-    """Call a function instead of giving it to a thread, of which the clock knows nothing."""
-    done = Future[Any]()
-    try:
-        done.set_result(function(*arguments, **named))
-    except Exception as error:
-        done.set_exception(error)
-    return done
-
-
 async def play_live(cases: dict[Case, Played]) -> list[list[Feedback]]:
     host, loop = SessionHost(Settings(voice="silent", media=MEDIA, idle=False)), asyncio.get_running_loop()
     await host.start()
@@ -101,13 +89,11 @@ async def play_live(cases: dict[Case, Played]) -> list[list[Feedback]]:
 
 
 @pytest.mark.slow
-def test_host_plays_the_corpus_as_it_is_played_offline(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_host_plays_the_corpus_as_it_is_played_offline() -> None:
     # In the first, voices take long; in the others, the text is not what a message may be.
     cases = {case: play(case) for case in CASES if "ready" not in case.wanted and not case.is_bytes}
     assert len(cases) >= 400
-    monkeypatch.setattr(ThreadPoolExecutor, "submit", called_at_once)
-    with asyncio.Runner(loop_factory=Loop) as runner:
-        live = runner.run(play_live(cases))
+    live = virtual_time.run(play_live(cases))
     assert all(map(is_in_order, live))
     agreed = map(agree, cases.values(), live)
     assert [case.name for case, same in zip(cases, agreed, strict=True) if not same] == []

@@ -212,6 +212,7 @@ def test_client_has_the_welcome_and_the_state() -> None:
             await client.control("set", aus={"12L": 0.5})
             layers: dict[str, Any] = {}
             while "direct" not in layers:  # it is reached smoothly
+                await asyncio.sleep(0.1)
                 layers = (await client.state())["characters"][0]["layers"]
             assert layers["direct"]["aus"].keys() == {"12L"}
 

@@ -96,7 +96,7 @@ def test_connection_that_was_lost_goes_on_with_blocks_and_feedback() -> None:
             numbers = [feedback.seq async for feedback in client.until_end("c")]
             assert numbers == list(range(1, len(numbers) + 1))
 
-    serving(test)
+    serving(test, real_time=True)
 
 
 def test_connection_that_was_lost_subscribes_and_asks_again() -> None:

@@ -246,7 +246,7 @@ def test_speech_of_the_sync_client_does_the_same() -> None:
     async def test(url: str) -> None:
         await asyncio.to_thread(plain, url)
 
-    serving(test)
+    serving(test, real_time=True)
 
 
 def test_speech_appends_a_text_of_any_length() -> None:

@@ -356,7 +356,7 @@ def test_voice_works_without_an_event_loop() -> None:
 
         assert await asyncio.to_thread(run) == ["DONE", "DONE"]
 
-    serving(test)
+    serving(test, real_time=True)
 
 
 def test_say_and_voice_report_each_word_when_it_is_spoken() -> None:
