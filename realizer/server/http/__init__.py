@@ -1,1 +1,1 @@
-"""The service over HTTP: page, tools, access control, metrics."""
+"""Everything on the service's port: the application, access, the page, WebSockets, metrics, the server."""
