@@ -108,7 +108,7 @@ def _optimum(quadratic: Quadratic, level: Float64) -> Float64:
         cost = _cost(quadratic, exact)
         if cost < least:
             best, least = exact, cost
-        pulling = force < -RESTS * quadratic.stiffness.max()
+        pulling = force < -RESTS * quadratic.stiffness.max(initial=0.0)
         if not pulling.any():
             return exact
         binding &= ~pulling

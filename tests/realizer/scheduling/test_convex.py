@@ -64,3 +64,12 @@ def test_feasible_start_finds_what_cannot_hold_together() -> None:
     )
     _, cycle = feasible_start(impossible, np.zeros(NODES))
     assert sorted(cycle or ()) == [0, 1]
+
+
+def test_optimum_without_springs_satisfies_inequalities() -> None:
+    none, nothing = np.zeros(0, np.intp), np.zeros(0)
+    u, v, w = np.array([0, 1]), np.array([1, 2]), np.array([1.0, 0.5])
+    rigid = Quadratic(3, none, none, nothing, nothing, u, v, w, np.arange(3))
+    level, _ = feasible_start(rigid, np.zeros(3))
+    found = optimum(rigid, level)
+    assert (found[v] - found[u] >= w - 1e-9).all()
