@@ -116,23 +116,23 @@ def track(folder: Path, names: tuple[str, ...], neutral: int | None, face: str, 
     failed = done = 0
     for film, target in found.items():
         try:
-            if (names and target.name not in names) or (recording_ := films.to_track(target)) is None:
+            if (names and target.name not in names) or (recording := films.to_track(target)) is None:
                 continue
             settings = marker_settings(film, chosen, neutral)
             if settings is not None:
-                recording_ = films.with_markers(recording_, follow_markers(film, settings, None), face)
+                recording = films.with_markers(recording, follow_markers(film, settings, None), face)
             else:
                 times, people = follow_faces(film, None)
-                recording_ = films.with_face(recording_, people[0], times)
+                recording = films.with_face(recording, people[0], times)
                 if len(people) > 1:
                     note(f"{film}: {len(people)} people; took the one who is seen most")
-            write_recording(target, recording_)
+            write_recording(target, recording)
         except (TrackingError, CorpusError) as error:
             click.echo(f"realizer: {error}", err=True)
             failed += 1
             continue
         done += 1
-        note(f"{target}: {recording_.frames} frames")
+        note(f"{target}: {recording.frames} frames")
     note(f"{folder}: {done} of {len(found)} films tracked, {failed} failed")
     return 1 if failed else 0
 

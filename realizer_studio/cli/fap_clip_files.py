@@ -71,22 +71,22 @@ def _from_csv(text: str) -> FAPClip:
     (_, head), *body = lines or [(1, [""])]
     head = [name.strip() for name in head]
     numbers = {row.name: row.fap for row in faps()[2:]}
-    if "time" not in head or not (wanted := {*numbers, *VISEME, *EXPRESSION}.intersection(head)):
+    if "time" not in head or not (named := {*numbers, *VISEME, *EXPRESSION}.intersection(head)):
         raise RealizerError(f"line 1: wanted a column time and some with names of FAPs, got {head[:6]}")
     if len(set(head)) < len(head):
         twice = next(name for name in head if head.count(name) > 1)
         raise RealizerError(f"line 1: wanted each column once, got {twice!r} twice")
-    column_of = {name: k for k, name in enumerate(head) if name in wanted or name == "time"}
+    column_of = {name: k for k, name in enumerate(head) if name in named or name == "time"}
     cells = np.empty((len(body), len(column_of)))
-    for place, (number, row) in enumerate(body):
+    for index, (number, row) in enumerate(body):
         if len(row) != len(head):
             raise RealizerError(f"line {number}: wanted {len(head)} cells, got {len(row)}")
-        cells[place] = [_number(row[k], f"line {number}, {name}") for name, k in column_of.items()]
+        cells[index] = [_number(row[k], f"line {number}, {name}") for name, k in column_of.items()]
     columns = dict(zip(column_of, cells.T, strict=True))
     fps, notes = _rate(columns["time"])
-    others = len(head) - 1 - len(wanted)
-    if others:
-        notes.append(f"{others} columns are not FAPs and are ignored")
+    ignored = len(head) - 1 - len(named)
+    if ignored:
+        notes.append(f"{ignored} columns are not FAPs and are ignored")
     values, mask = np.zeros((len(body), 68)), np.zeros(68, bool)
     for name, fap in numbers.items():
         if name in columns:

@@ -150,9 +150,9 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
     from realizer.core.atomic_files import write_bytes
 
     if source == "-" or (Path(source).suffix.lower() in POINTS and Path(source).is_file()):
-        text, rate, values, seen, there = _from_points(source, output, fps or 25.0)
+        text, rate, values, measured, visible = _from_points(source, output, fps or 25.0)
     else:
-        text, rate, values, seen, there = _from_pictures(Path(source), output, fps, **choices)
+        text, rate, values, measured, visible = _from_pictures(Path(source), output, fps, **choices)
     with inputs.opening(output):
         write_bytes(output, text.encode())
     if profiles is not None:
@@ -162,7 +162,7 @@ def track(source: str, output: Path, fps: float | None, profiles: str | None, **
             raise click.UsageError(
                 "--profiles needs feature points of MPEG-4 among the markers; see --layout"
             )
-        for part in recogniser(profiles).intervals(values, rate, seen, there):
+        for part in recogniser(profiles).intervals(values, rate, measured, visible):
             click.echo(f"{part.start:8.2f} {part.end:8.2f} {part.emotion or '-'} {part.certainty:.2f}")
 
 
@@ -178,10 +178,11 @@ def _from_points(source: str, output: Path, fps: float) -> Tracked:
     text = inputs.decode(inputs.read_file(source), source, "a table")
     with inputs.reporting(ValueError):
         moving, rest = read_points(text, source)
-        values, seen = faps_from_points(bridge(moving), rest, _fapu(rest, source))
+        values, observed = faps_from_points(bridge(moving), rest, _fapu(rest, source))
     times = np.arange(len(values)) / fps
-    note(f"{output}: {len(values)} frames, {int(seen.sum())} FAPs")
-    return encode(FAPClip.of(FAPFrames(times, values, seen), fps, output.stem)), fps, values, seen, None
+    note(f"{output}: {len(values)} frames, {int(observed.sum())} FAPs")
+    clip = FAPClip.of(FAPFrames(times, values, observed), fps, output.stem)
+    return encode(clip), fps, values, observed, None
 
 
 def _from_markers(
@@ -194,11 +195,11 @@ def _from_markers(
     with inputs.reporting(TrackingError):
         markers = follow_markers(source, settings, fps)
         text = FORMATS[output.suffix.lower()](markers, face, output.stem)
-        known = len([name for name in markers.layout.feature_points if name]) > 1
-        faps, seen = faps_of(markers, face) if known else (None, None)
+        has_points = len([name for name in markers.layout.feature_points if name]) > 1
+        faps, measured = faps_of(markers, face) if has_points else (None, None)
     found = f"{len(markers.layout)} markers, {markers.visible.mean():.1%} of them seen"
     note(f"{output}: {len(markers.points)} frames, {found}")
-    return text, markers.fps, faps, seen, None
+    return text, markers.fps, faps, measured, None
 
 
 def _from_pictures(

@@ -17,12 +17,12 @@ JOINED = 12  # frames from a segment to the next up to which both are joined (eq
 def find(recording: Recording, learnt: FaceMap) -> list[Segment]:
     """Return the segments of all expressions for which a map has neurons, in order."""
     distance = distances(learnt.project(features(recording)), learnt.neurons)
-    segments_ = []
+    found = []
     for name in sorted({*learnt.names} - {""}):
         neurons = [k for k, other in enumerate(learnt.names) if other == name]
         accepted = np.asarray((distance[:, neurons] <= learnt.accepted[neurons]).any(axis=1))
-        segments_ += [Segment(first, last, name, FINDER) for first, last in segments(accepted)]
-    return sorted(segments_, key=lambda one: (one.first, one.last))
+        found += [Segment(first, last, name, FINDER) for first, last in segments(accepted)]
+    return sorted(found, key=lambda one: (one.first, one.last))
 
 
 def segments(shown: Bool) -> list[tuple[int, int]]:

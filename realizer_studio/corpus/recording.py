@@ -204,11 +204,11 @@ def read_annotations(text: str) -> tuple[Annotation, ...]:
 def read_faps(text: str) -> tuple[Float64, float]:
     """Parse a CSV with columns time and FAP names; return FAPs (n, 68) and the rate; raises ValueError."""
     columns = numbers(text)
-    columns_ = [row.fap - 1 for row in faps() if row.name in columns]
-    if "time" not in columns or not columns_:
+    indices = [row.fap - 1 for row in faps() if row.name in columns]
+    if "time" not in columns or not indices:
         raise ValueError(f"no column time, or no columns named as FAPs, but {','.join(columns)[:80]}")
     values = np.zeros((len(columns["time"]), 68))
-    values[:, columns_] = np.stack([columns[faps()[column].name] for column in columns_], axis=1)
+    values[:, indices] = np.stack([columns[faps()[index].name] for index in indices], axis=1)
     if not np.isfinite(values).all() or not 0 < len(values) <= MAX_FRAMES:
         raise ValueError(f"values that are not finite, none, or more than {MAX_FRAMES}")
     return values, rate_of(columns["time"])

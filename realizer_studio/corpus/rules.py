@@ -47,8 +47,8 @@ def write_rules(folder: Path, study: Study) -> list[str]:
     tables = [*_placements(study), *_companions(study), *_paces(study)]
     texts = {"knowledge.toml": _toml(tables), "templates.toml": _toml(_durations(study))}
     found = {name: HEAD.format(len(study.recordings)) + text for name, text in texts.items() if text}
-    if profiles_ := profiles(study):
-        found["profiles.txt"] = write_profiles(profiles_)
+    if emotions := profiles(study):
+        found["profiles.txt"] = write_profiles(emotions)
     for name, text in found.items():
         write_text(folder / name, text)
     return [*found, *write_expressions(folder, study)]

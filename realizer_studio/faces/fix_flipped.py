@@ -6,14 +6,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Int32
-from realizer.face.basis import (
-    BEYOND,
-    FAPS,
-    JAW_COS,
-    JAW_DROP,
-    JAW_SIN,
-    ROWS,
-)
+from realizer.face.basis import BEYOND, FAPS, JAW_COS, JAW_DROP, JAW_SIN, ROWS
 from realizer.face.coupling import CONTOURS, Contours, contours_of, couple_lips
 from realizer.face.deform import jaw_pose
 from realizer.face.mesh_geometry import triangle_normals

@@ -36,7 +36,7 @@ ANSWERS: Mapping[str, tuple[str, ...]] = {
     "films": ("same",),
 }
 KINDS = tuple(ANSWERS)
-WHEEL = {place.name: place.angle for place in ring("paul").values() if place.kind == "basic"}
+WHEEL = {emotion.name: emotion.angle for emotion in ring("paul").values() if emotion.kind == "basic"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def displacements(variants: Sequence[Variant], draw: Drawer) -> Iterator[Item]:
             rest, *pictures = draw(variant, rows, camera)
             for (found, value), picture in zip(selected, pictures, strict=True):
                 difference_picture = difference(opaque(picture), opaque(rest), faint(rest))
-                pictures_ = {
+                images = {
                     "neutral": webp(rest),
                     "moved": webp(picture),
                     "difference": webp(difference_picture),
@@ -95,7 +95,7 @@ def displacements(variants: Sequence[Variant], draw: Drawer) -> Iterator[Item]:
                 truth |= {"weight": weights()[found.fap], "moves": bool((picture != rest).any())}
                 direction = f"{found.direction}{'' if sign > 0 else ', reversed'}"
                 text = {"fap": f"FAP {found.fap} {found.name} {value:+g} ({direction})"}
-                yield Item("displacements", truth, pictures_, text=text)
+                yield Item("displacements", truth, images, text=text)
 
 
 def checks(items: Sequence[Item], draws: np.random.Generator) -> list[Item]:
@@ -125,11 +125,11 @@ def control(text: str, expressions: int, draws: np.random.Generator) -> str:
         f'<sync id="r{k}"/>{escape(word)}' if k in positions else escape(word) for k, word in enumerate(words)
     )
     names = [str(name).lower() for name in draws.choice(list(templates()), expressions)]
-    expressions_ = [
+    elements = [
         f'{TAG} id="e{k}" name="{PREFIX}{name}" intensity="{INTENSITY}" start="speech1:r{position}"/>'
         for k, (name, position) in enumerate(zip(names, positions, strict=True))
     ]
-    return DOCUMENT.format(speech, "".join(expressions_))
+    return DOCUMENT.format(speech, "".join(elements))
 
 
 def films(

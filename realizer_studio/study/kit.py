@@ -51,9 +51,9 @@ class Plan:
         found: list[Item] = []
         with Drawer(step) as draw:
             if matched := [kind for kind in MATCHING if kind in self.kinds]:
-                references_ = self._references(draw, draws)
+                compared = self._references(draw, draws)
                 for variant in self.variants:
-                    found += matching(matched, variant, references_, draw, draws)
+                    found += matching(matched, variant, compared, draw, draws)
             if "naming" in self.kinds:
                 found += naming(self.variants, draw)
             if "displacements" in self.kinds:
@@ -74,10 +74,10 @@ class Plan:
         used = [one.face for one in self.variants]
         unused = (info.name for info in list_faces() if info.name not in used)
         source = self.source or next(unused, used[0])
-        references_ = references(source, draw)
+        available = references(source, draw)
         if self.most is None:
-            return references_
-        return [references_[k] for k in draws.permutation(len(references_))[: -(-self.most // TRIPLES)]]
+            return available
+        return [available[k] for k in draws.permutation(len(available))[: -(-self.most // TRIPLES)]]
 
 
 ITEMS, TEXTS, PAGE = "items.js", "texts.js", "index.html"

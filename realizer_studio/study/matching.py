@@ -90,7 +90,7 @@ def _photographs(source: Path) -> list[Reference]:
 def matching(
     kinds: Sequence[str],
     variant: Variant,
-    references_: Sequence[Reference],
+    compared: Sequence[Reference],
     draw: Drawer,
     draws: np.random.Generator,
 ) -> Iterator[Item]:
@@ -102,7 +102,7 @@ def matching(
     Raises:
         RealizerError: no unit can be removed or added visibly.
     """
-    for reference in references_:
+    for reference in compared:
         fewer, more = _fewer(reference.units), _more(reference.units, draws)
         candidates = [reference.units, *fewer.values(), *more.values()]
         right, *changed_faces = draw(variant, [row(units) for units in candidates])

@@ -71,12 +71,12 @@ def components(faces: Sequence[Landmarks], weights: Mapping[str, Any] | None = N
     """Return the components of faces."""
     weights = stored() if weights is None else weights
     rotations, shapes = upright(np.stack([face.points for face in faces]), weights["head"])
-    inputs_ = {
+    parts = {
         "shape": shapes.reshape(len(faces), -1),
         "traits": np.stack([face.traits for face in faces]),
         "eyes": np.stack([face.eyes.ravel() for face in faces]),
     }
-    values = [(inputs_[part] - weights[f"{part}_mean"]) @ weights[f"{part}_basis"] for part in PARTS]
+    values = [(parts[part] - weights[f"{part}_mean"]) @ weights[f"{part}_basis"] for part in PARTS]
     return Components(np.concatenate(values, axis=1).astype(np.float64), rotations)
 
 

@@ -92,7 +92,7 @@ def _tables() -> dict[str, Any]:
         }
         for row in faps()[2:]
     ]  # fmt: skip
-    template_points = {name: place.round(4).tolist() for name, place in template()[0].items()}
+    template_points = {name: position.round(4).tolist() for name, position in template()[0].items()}
     descriptions = {row.name: row.says for row in csv_rows("point_names.csv", _PointName, __package__)}
     links = [[pair.one, pair.other] for pair in pairs()]
     names = {row.au: row.name for row in action_units()}
@@ -106,7 +106,7 @@ def _tables() -> dict[str, Any]:
     }
 
 
-def placed_points(folder: Path, positions: Mapping[str, Any]) -> dict[str, Point]:
+def moved_points(folder: Path, positions: Mapping[str, Any]) -> dict[str, Point]:
     """Return the feature points at new positions, each with the nearest vertex of its part."""
     parts = read_head(folder)["parts"]
     at = np.asarray(read_arrays(folder / "mesh.npz", MESH)["vertices"], np.float64)
@@ -123,7 +123,7 @@ def placed_points(folder: Path, positions: Mapping[str, Any]) -> dict[str, Point
     return out
 
 
-def is_here(setup: Setup, points: Mapping[str, Any]) -> bool:
+def is_same_head(setup: Setup, points: Mapping[str, Any]) -> bool:
     """Return whether the points of a file are those of the head, so that its zones need no conversion."""
     shared = set(setup.points) & set(points)
     return bool(shared) and all(np.allclose(setup.points[k], points[k], atol=2e-6) for k in shared)

@@ -23,7 +23,7 @@ from realizer.face.reading import read_arrays
 from realizer.server.http.face_glb import face_glb
 from realizer.server.runtime.edit_folder import LOCK, NAME
 from realizer_studio.editors.face.bare_head import import_bare
-from realizer_studio.editors.face.head_message import FACE_NAME, head_message, is_here, placed_points
+from realizer_studio.editors.face.head_message import FACE_NAME, head_message, is_same_head, moved_points
 from realizer_studio.editors.face.unit_fits import FILES as UNIT_FILES
 from realizer_studio.editors.face.unit_fits import UnitFits
 from realizer_studio.editors.packed_messages import packed, unpacked
@@ -134,7 +134,7 @@ class Studio:
         work = self._new(folder.name)
         try:
             shutil.copytree(source, work, dirs_exist_ok=True)
-            write_features(work / "features.csv", placed_points(work, setup.points))
+            write_features(work / "features.csv", moved_points(work, setup.points))
             (work / FILE).unlink(missing_ok=True)
             parameters = work / "zones.toml"
             write_setup(parameters, setup)
@@ -189,9 +189,9 @@ class Studio:
         folder, setup = self._source(), setup_from("setup", _table(request))
         # A face with a model keeps the mouth of the model.
         points_of_page = {} if (folder / UNIT_FILES[1]).is_file() else setup.points
-        key = json.dumps({name: list(place) for name, place in points_of_page.items()})
+        key = json.dumps({name: list(position) for name, position in points_of_page.items()})
         if key not in self._fits:
-            found = placed_points(folder, points_of_page)
+            found = moved_points(folder, points_of_page)
             face = replace(
                 load_folder(folder, "mpeg4"),
                 points={name: np.array(point.place, np.float32) for name, point in found.items()},
@@ -214,7 +214,7 @@ class Studio:
             path.write_bytes(payload)
             try:
                 setup = read_setup(path) if path.suffix == ".toml" else read_faceeditor(path)
-                if path.suffix != ".toml" and not is_here(setup, points):
+                if path.suffix != ".toml" and not is_same_head(setup, points):
                     setup = fitted(setup, points)
             except FaceError as error:
                 raise FaceError(str(error).replace(str(path), file)) from None

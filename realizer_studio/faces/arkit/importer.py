@@ -69,8 +69,8 @@ def import_head(path: Path, folder: Path, name: str | None = None) -> Report:
     head = read_head(path)
     folder.parent.mkdir(parents=True, exist_ok=True)
     # The draft is beside the folder, so that files are complete and moving them is atomic.
-    with TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as temporary_:
-        draft = Path(temporary_) / folder.name
+    with TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as beside:
+        draft = Path(beside) / folder.name
         draft.mkdir()
         report = _write(head, draft, name or folder.name)
         folder.mkdir(exist_ok=True)

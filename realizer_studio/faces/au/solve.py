@@ -157,14 +157,14 @@ class Fit:
                 # The linear and the quadratic form of beta's cubic part must not both start at 0.
                 x[6], x[11], x[12], x[19] = slope, 0.01, 0.01, tilt
                 for _ in range(ROUNDS[0]):
-                    direction_ = self._directions_at(x, at)[0]
-                    by = lengths(moves - length[:, None] * direction_, weight)
+                    unit = self._directions_at(x, at)[0]
+                    by = lengths(moves - length[:, None] * unit, weight)
 
                     def residual(x: Float64, by: Float64 = by) -> tuple[Float64, Float64]:
-                        direction_, slopes = self._directions_at(x, at)
+                        unit, slopes = self._directions_at(x, at)
                         scale = (by * length)[:, None]
                         return (
-                            (scale * direction_ - by[:, None] * moves).ravel(),
+                            (scale * unit - by[:, None] * moves).ravel(),
                             (scale[:, None] * slopes).reshape(-1, 20),
                         )
 
@@ -199,16 +199,16 @@ class Fit:
 
         def moved(x: Float64) -> tuple[Float64, Float64, Float64, Float64]:
             value, by_bell = density(form(x[:split]).reshape(-1, GAUSSIAN), self.at)
-            direction_, by_angle = self._directions_at(x[split:], self.at)
-            return value, by_bell @ form.matrix, direction_, by_angle
+            unit, by_angle = self._directions_at(x[split:], self.at)
+            return value, by_bell @ form.matrix, unit, by_angle
 
         def far(x: Float64) -> tuple[Float64, Float64]:
             over, steep = overshoot(form(x[:split]).reshape(-1, GAUSSIAN), self.around)
             return over, np.pad(steep @ form.matrix, ((0, 0), (0, len(x) - split)))
 
         def miss(x: Float64) -> Float64:
-            value, _, direction_, _ = moved(x)
-            return np.asarray(value[:, None] * direction_ - self.moves)
+            value, _, unit, _ = moved(x)
+            return np.asarray(value[:, None] * unit - self.moves)
 
         def total_cost(x: Float64) -> float:
             return float(self.weight @ np.linalg.norm(miss(x), axis=1) + (far(x)[0] ** 2).sum())
@@ -218,15 +218,13 @@ class Fit:
             by = lengths(miss(x), self.weight)
 
             def residual(x: Float64, by: Float64 = by) -> tuple[Float64, Float64]:
-                value, by_bell, direction_, by_angle = moved(x)
+                value, by_bell, unit, by_angle = moved(x)
                 slopes = np.concatenate(
-                    [direction_[:, :, None] * by_bell[:, None, :], value[:, None, None] * by_angle], axis=2
+                    [unit[:, :, None] * by_bell[:, None, :], value[:, None, None] * by_angle], axis=2
                 )
                 over, steep = far(x)
                 return (
-                    np.concatenate(
-                        [(by[:, None] * (value[:, None] * direction_ - self.moves)).ravel(), over]
-                    ),
+                    np.concatenate([(by[:, None] * (value[:, None] * unit - self.moves)).ravel(), over]),
                     np.concatenate([(by[:, None, None] * slopes).reshape(-1, len(x)), steep]),
                 )
 
@@ -263,8 +261,8 @@ class Fit:
 
     def _grown(self, found: FitResult, most: int) -> Iterator[tuple[str, Float64, Float64]]:
         """Yield starts with one more Gaussian, or a symmetric pair, at the point of the largest error."""
-        direction_ = self._directions_at(found.angles, self.at)[0]
-        lack = np.einsum("ij,ij->i", self.moves, direction_) - density(found.gaussians, self.at)[0]
+        unit = self._directions_at(found.angles, self.at)[0]
+        lack = np.einsum("ij,ij->i", self.moves, unit) - density(found.gaussians, self.at)[0]
         worst = int(np.argmax(self.weight * np.abs(lack)))
         high, (x, y, z) = lack[worst] / 2, self.at[worst]
         pair = len(found.gaussians) + 2 <= most
@@ -277,8 +275,8 @@ class Fit:
         """Return directions (n, 3) and their derivatives (n, 3, 20) by the free parameters."""
         alpha, by_alpha = angle(self.alpha(x[:7]), at)
         beta, by_beta = angle(self.beta(x[7:]), at)
-        direction_, turned, raised = direction(alpha, beta)
-        return direction_, np.concatenate(
+        unit, turned, raised = direction(alpha, beta)
+        return unit, np.concatenate(
             [
                 turned[:, :, None] * (by_alpha @ self.alpha.matrix)[:, None, :],
                 raised[:, :, None] * (by_beta @ self.beta.matrix)[:, None, :],

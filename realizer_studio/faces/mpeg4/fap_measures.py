@@ -33,6 +33,8 @@ INNER = 0.30  # baked occlusion below which skin is behind the lips or in a sock
 
 @dataclass(frozen=True, eq=False)
 class Measure:
+    """A face, prepared for measuring the displacements of its skin."""
+
     face: Face
     skin: slice
     triangles: Any  # of the skin

@@ -44,13 +44,13 @@ def zone_fields(setup: Setup, vertices: Float64) -> dict[int, Float64]:
     """
     at = np.asarray(vertices, np.float64)
     n = len(at)
-    distance, open_ = {}, {}
+    distance, unmasked = {}, {}
     for fap, zone in setup.zones.items():
         distance[fap] = np.linalg.norm((at - _centre(setup, zone)) / zone.radii, axis=1)
-        open_[fap] = _unmasked(setup, zone, n)
-    weights = {fap: zone.influence(distance[fap]) * open_[fap] for fap, zone in setup.zones.items()}
+        unmasked[fap] = _unmasked(setup, zone, n)
+    weights = {fap: zone.influence(distance[fap]) * unmasked[fap] for fap, zone in setup.zones.items()}
     if setup.joined and setup.zones:
-        weights = _shared(setup, at, distance, open_, weights)
+        weights = _shared(setup, at, distance, unmasked, weights)
     return {fap: _directed(setup, zone, at, weights[fap]) for fap, zone in setup.zones.items()}
 
 
@@ -72,16 +72,16 @@ def _unmasked(setup: Setup, zone: Zone, n: int) -> Float64:
             f"mask of FAP {zone.fap}: wanted vertices 0..{n - 1}, got {mask.min()}..{mask.max()}; "
             "take out those that the mesh does not have"
         )
-    open_ = np.zeros(n)
-    open_[mask] = 1
-    return 1 - open_ if zone.invert_mask else open_
+    unmasked = np.zeros(n)
+    unmasked[mask] = 1
+    return 1 - unmasked if zone.invert_mask else unmasked
 
 
 def _shared(
     setup: Setup,
     at: Float64,
     distance: Mapping[int, Float64],
-    open_: Mapping[int, Float64],
+    unmasked: Mapping[int, Float64],
     unshared: Mapping[int, Float64],
 ) -> dict[int, Float64]:
     """Return the influence of each zone after overlapping neighbours have shared it."""
@@ -96,11 +96,11 @@ def _shared(
         for pair in links:
             if pair.one in group:
                 envelope = np.maximum(
-                    envelope, _between(setup, pair, at) * open_[pair.one] * open_[pair.other]
+                    envelope, _between(setup, pair, at) * unmasked[pair.one] * unmasked[pair.other]
                 )
         # Vertices near a point belong to its zone; zones farther than twice their radius have no influence.
         strength = {
-            fap: open_[fap]
+            fap: unmasked[fap]
             * np.clip(2 - distance[fap], 0, None) ** 2
             / np.maximum(distance[fap], NEAREST) ** POWER
             for fap in group

@@ -69,13 +69,13 @@ class Zone:
         """Return the influence (n,) at distances (n,) in radii: 1 at the centre, 0 at the edge."""
         if self.falloff == "smooth":
             return smooth_curve(distance, self.smooth_centre, self.smooth_side)
-        distance_ = np.clip(distance, 0, 1)
+        limited = np.clip(distance, 0, 1)
         if self.falloff == "cosine":  # raised cosine (Paul 2010, 8.2)
-            return np.asarray((1 + np.cos(np.pi * distance_)) / 2, np.float64)
+            return np.asarray((1 + np.cos(np.pi * limited)) / 2, np.float64)
         if self.falloff == "ease":  # Paul 2010, 4.3.3
             power = 1 + self.ease / (100 if self.ease <= 0 else 20)
-            distance_ = distance_ ** max(power, MIN_POWER)
-        return np.asarray(1 - distance_, np.float64)
+            limited = limited ** max(power, MIN_POWER)
+        return np.asarray(1 - limited, np.float64)
 
     def mirrored(self, fap: int) -> Zone:
         """Return the mirrored zone, for the FAP of the other side."""

@@ -130,8 +130,8 @@ class Skin:
 
     def normals(self) -> Float32:
         """Return unit normals of the texels, (k, 3)."""
-        normals_ = self.texels.spread(vertex_normals(self.part.vertices, self.part.triangles))
-        return self.float(normals_ / np.maximum(np.linalg.norm(normals_, axis=1, keepdims=True), 1e-9))
+        vectors = self.texels.spread(vertex_normals(self.part.vertices, self.part.triangles))
+        return self.float(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9))
 
     @staticmethod
     def float(values: Any) -> Float32:

@@ -200,17 +200,17 @@ def _initial_layout(found: Sequence[Float64], settings: MarkerSettings, where: s
         raise TrackingError(
             f"{where}: wanted a picture from 0 to {len(found) - 1} as --neutral, got {tried[0]}"
         )
-    layout_ = settings.layout or (wojdel() if usual == len(wojdel()) else None)
-    if layout_ is not None:
-        layout_ = layout_.with_colours(len(settings.colours))
-        fits = [(locate(layout_, found[k]), k) for k in tried]
+    candidate = settings.layout or (wojdel() if usual == len(wojdel()) else None)
+    if candidate is not None:
+        candidate = candidate.with_colours(len(settings.colours))
+        fits = [(locate(candidate, found[k]), k) for k in tried]
         (positions, error), start = min(fits, key=lambda fit: fit[0][1])
-        if positions is not None and error < GOOD * layout_.with_positions(positions).size:
-            return layout_.with_positions(nearest(positions, layout_, found[start])), start
+        if positions is not None and error < GOOD * candidate.with_positions(positions).size:
+            return candidate.with_positions(nearest(positions, candidate, found[start])), start
         if settings.layout is not None:
             raise TrackingError(
-                f"{where}: wanted the {len(layout_)} markers of the layout, found {usual} of {colours} that "
-                "do not lie like them; see --layout, --marker-at and --region"
+                f"{where}: wanted the {len(candidate)} markers of the layout, found {usual} of {colours} "
+                "that do not lie like them; see --layout, --marker-at and --region"
             )
     start = tried[0]
     return numbered(found[start] * (*UP, 1.0)), start
