@@ -18,9 +18,8 @@ PACKAGES = {
     "realizer": Path(realizer.__path__[0]),
     "realizer_studio": Path(realizer_studio.__path__[0]),
 }
-# Tested from outside: tests/browser, tests/realizer/test_pipeline.py; what a copy without the studio does:
-# tests/test_distribution.py.
-ELSEWHERE = {"realizer/examples", "realizer_studio"}
+# Tested from outside, by documents and a browser: tests/browser, tests/realizer/test_pipeline.py.
+ELSEWHERE = {"realizer/examples"}
 
 
 def packages() -> list[str]:

@@ -10,8 +10,8 @@ from realizer.charts.chart_data import charts_of
 from realizer.charts.picture import timeline
 from realizer.charts.svg import svg
 from realizer.examples import examples
-from realizer.explained import steps_of
 from realizer.result import Realization
+from realizer_studio.explained import steps_of
 
 TEMPLATE = Path(__file__).with_name("steps.template")
 

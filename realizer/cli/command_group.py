@@ -14,18 +14,15 @@ from realizer.core.registry import Registry
 COMMANDS: Registry[click.Command] = Registry(
     "realizer.commands",
     {
-        "batch": "realizer.cli.batch:batch",
         "check": "realizer.cli.check:check",
         "demo": "realizer.cli.demo:demo",
         "doctor": "realizer.cli.doctor:doctor",
         "emotion": "realizer.cli.emotion:emotion",
         "enrich": "realizer.cli.enrich:enrich",
-        "explain": "realizer.cli.explain:explain",
         "faces": "realizer.cli.faces:faces",
         "outputs": "realizer.cli.doctor:outputs",
         "plugins": "realizer.cli.doctor:plugins",
         "realize": "realizer.cli.realize:realize",
-        "replay": "realizer.cli.replay:replay",
         "schedule": "realizer.cli.realize:schedule",
         "serve": "realizer.cli.serve:serve",
         "timeline": "realizer.cli.timeline:timeline",

@@ -19,10 +19,10 @@ from websockets.asyncio.client import ClientConnection, connect
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.cli import cli
 from realizer.core.settings import Settings
-from realizer.server.journal.playback import replay_feedback
 from realizer.server.journal.recordings import read_recording
 from realizer.server.journal.session_journal import ENTRIES
 from realizer.server.serve import Server
+from realizer_studio.recorded_sessions import replay_feedback
 from tests.feedback_log import read_feedback, seq_numbers
 from tests.programs import serving
 from tests.waiting import LIMIT

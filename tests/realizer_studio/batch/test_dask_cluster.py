@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.dask_cluster import DaskCluster
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, Worker
 from realizer.core.errors import RealizerError
+from realizer_studio.batch.dask_cluster import DaskCluster
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Outcome, Worker
 
 # It is not imported here: every process of pytest-xdist would.
 pytestmark = pytest.mark.skipif(find_spec("distributed") is None, reason="needs the cluster extra")
@@ -102,7 +102,7 @@ def test_cluster_names_the_loss_of_its_scheduler(tasks: list[Task], options: Opt
 def test_cluster_names_an_address_without_a_scheduler(
     options: Options, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("realizer.batch.dask_cluster.PATIENCE", 0.2)
+    monkeypatch.setattr("realizer_studio.batch.dask_cluster.PATIENCE", 0.2)
     with pytest.raises(RealizerError, match="wanted a Dask scheduler there"):
         DaskCluster(options, "tcp://127.0.0.1:9")
 

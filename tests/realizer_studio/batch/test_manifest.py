@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from realizer.batch.manifest import NAME, BusyError, Manifest
+from realizer_studio.batch.manifest import NAME, BusyError, Manifest
 
 
 def row(name: str, status: str = "done", content: bytes = b"") -> dict[str, Any]:

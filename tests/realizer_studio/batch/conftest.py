@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.task import Options, Task, fingerprint, key_of
+from realizer_studio.batch.task import Options, Task, fingerprint, key_of
 
 
 @pytest.fixture(scope="session")

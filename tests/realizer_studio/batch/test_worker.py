@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Worker, perform
 from realizer.offline import realize
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
 from realizer.speech.engine_voice import EngineVoice
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Worker, perform
 
 
 @pytest.fixture

@@ -16,9 +16,9 @@ from realizer.cli.progress import bar, note, warn_no_voice
 from realizer.cli.realize import PICTURES, performance_options
 
 if TYPE_CHECKING:
-    from realizer.batch.dask_cluster import DaskCluster
-    from realizer.batch.process_pool import ProcessPool
-    from realizer.batch.task import Options
+    from realizer_studio.batch.dask_cluster import DaskCluster
+    from realizer_studio.batch.process_pool import ProcessPool
+    from realizer_studio.batch.task import Options
 
 STATUS = ("done", "refused", "failed")
 
@@ -81,9 +81,9 @@ def batch(
         raise click.UsageError("--workers, --dask: wanted one of them, got both")
     strict: bool = flags.pop("strict")
     how = _options(formats, flags)
-    from realizer.batch.run import DocumentsError, find
-    from realizer.batch.run import batch as run
     from realizer.outputs.registry import OUTPUTS
+    from realizer_studio.batch.run import DocumentsError, find
+    from realizer_studio.batch.run import batch as run
 
     with inputs.reporting(DocumentsError):
         lines = (list(filter(str.strip, sys.stdin.read().splitlines())) if p == "-" else [p] for p in places)
@@ -122,8 +122,8 @@ def batch(
 
 def _options(formats: tuple[str, ...], flags: dict[str, Any]) -> Options:
     """Return the options of the batch; fails if the voice is not installed."""
-    from realizer.batch.task import Options
     from realizer.speech.registry import find_voice
+    from realizer_studio.batch.task import Options
 
     chosen = inputs.play_settings(flags, light=flags["light"], background=flags["background"])
     if any(suffix in PICTURES for suffix in formats):
@@ -145,10 +145,10 @@ def _options(formats: tuple[str, ...], flags: dict[str, Any]) -> Options:
 
 def _workers(how: Options, workers: int, dask: str | None) -> ProcessPool | DaskCluster:
     if dask is not None:
-        from realizer.batch.dask_cluster import DaskCluster
+        from realizer_studio.batch.dask_cluster import DaskCluster
 
         return DaskCluster(how, dask)
-    from realizer.batch.process_pool import ProcessPool
+    from realizer_studio.batch.process_pool import ProcessPool
 
     return ProcessPool(how, workers)
 

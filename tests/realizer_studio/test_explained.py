@@ -3,7 +3,7 @@
 import pytest
 
 import realizer
-from realizer.explained import Step, as_html, as_text, steps_of
+from realizer_studio.explained import Step, as_html, as_text, steps_of
 
 BML = """<bml id="b">
 <speech id="s"><text>Hello <sync id="m"/>there</text></speech>

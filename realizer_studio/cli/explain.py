@@ -40,8 +40,8 @@ def explain(
     chosen = inputs.settings(documents, **flags)
     texts = inputs.read_documents(documents, chosen.language)
     from realizer import pipeline
-    from realizer.explained import as_html, as_picture, as_text, steps_of
     from realizer.result import Realization
+    from realizer_studio.explained import as_html, as_picture, as_text, steps_of
 
     play = chosen.play_options(inputs.read_scene(chosen.scene))
     played = Realization.of(pipeline.play(texts, replace(play, idle=play.idle and not no_idle), chosen.voice))

@@ -15,9 +15,9 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, Worker, failure
 from realizer.core.threads import SINGLE_THREAD
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Outcome, Worker, failure
 
 TRIES = 3  # a task whose process has died so often fails
 

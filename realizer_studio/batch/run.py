@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from realizer.batch.dask_cluster import DaskCluster
-from realizer.batch.manifest import Manifest, Row
-from realizer.batch.process_pool import ProcessPool
-from realizer.batch.task import Options, Task, fingerprint, key_of
-from realizer.batch.worker import Outcome, failure
 from realizer.core.atomic_files import write_bytes
 from realizer.core.errors import RealizerError
+from realizer_studio.batch.dask_cluster import DaskCluster
+from realizer_studio.batch.manifest import Manifest, Row
+from realizer_studio.batch.process_pool import ProcessPool
+from realizer_studio.batch.task import Options, Task, fingerprint, key_of
+from realizer_studio.batch.worker import Outcome, failure
 
 SUFFIXES = (".bml", ".xml")  # of documents in a folder
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from realizer.batch.task import Options, Task, fingerprint
 from realizer.core.errors import RealizerError, VoiceError
 from realizer.outputs.output import RenderSettings
 from realizer.outputs.registry import OUTPUTS
@@ -14,6 +13,7 @@ from realizer.pipeline import play
 from realizer.realization import Realization
 from realizer.render.renderer import Renderer
 from realizer.speech.utterance import SpeechRequest, Utterance, Voice
+from realizer_studio.batch.task import Options, Task, fingerprint
 
 
 @dataclass(frozen=True, slots=True)

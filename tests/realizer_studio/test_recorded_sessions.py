@@ -17,14 +17,15 @@ from realizer.core.array_types import Int32
 from realizer.core.settings import Settings
 from realizer.outputs.output import RenderSettings
 from realizer.protocol.wire import ClipPiece, pack_clip, unpack
-from realizer.server.journal import JournalError, playback
+from realizer.server.journal import JournalError
 from realizer.server.journal.entry import SavedSession
-from realizer.server.journal.playback import replay_recording
 from realizer.server.journal.recordings import RecordingFolder, read_recording, recording_head
 from realizer.server.session.effects import Send, Speak
 from realizer.server.session.session import Session
 from realizer.speech.duration_fit import speak_to_length
 from realizer.speech.silent import SilentVoice
+from realizer_studio import recorded_sessions
+from realizer_studio.recorded_sessions import replay_recording
 from tests.pictures import drawn_here
 from tests.wake_times import next_wake
 
@@ -71,7 +72,7 @@ def recorded(folder: Path) -> tuple[Path, list[str]]:
 def test_replay_recording_repeats_the_feedback_to_the_last_digit(tmp_path: Path) -> None:
     path, feedback = recorded(tmp_path)
     realization, again = replay_recording(read_recording(path))
-    assert again == playback.replay_feedback(read_recording(path)) == feedback
+    assert again == recorded_sessions.replay_feedback(read_recording(path)) == feedback
     assert any('"b:end"' in text for text in feedback)
     last = json.loads(path.read_text().splitlines()[-1])
     assert realization.duration == pytest.approx(last["at"], abs=0.05)

@@ -34,8 +34,8 @@ def replay(record: Path, output: str | None, **flags: Any) -> None:
     """
     from realizer.outputs.output import RenderSettings
     from realizer.server.journal import JournalError
-    from realizer.server.journal.playback import replay_feedback, replay_recording
     from realizer.server.journal.recordings import read_recording
+    from realizer_studio.recorded_sessions import replay_feedback, replay_recording
 
     writer = writer_for(output)
     changes = {name: flags.pop(name) for name in ("fps", "face", "voice")}

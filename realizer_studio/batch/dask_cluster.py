@@ -5,9 +5,9 @@ from collections.abc import Iterable, Iterator
 from itertools import islice
 from typing import Any
 
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, failure, perform
 from realizer.core.errors import RealizerError
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Outcome, failure, perform
 
 log = logging.getLogger(__name__)
 

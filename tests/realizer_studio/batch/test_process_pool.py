@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from realizer.batch import process_pool
-from realizer.batch.process_pool import TRIES, ProcessPool
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, Worker
+from realizer_studio.batch import process_pool
+from realizer_studio.batch.process_pool import TRIES, ProcessPool
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Outcome, Worker
 
 
 def by_name(outcomes: list[Outcome]) -> dict[str, Outcome]:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.process_pool import ProcessPool
-from realizer.batch.run import DocumentsError, batch, find
-from realizer.batch.task import Options, Task
-from realizer.batch.worker import Outcome, Worker
+from realizer_studio.batch.process_pool import ProcessPool
+from realizer_studio.batch.run import DocumentsError, batch, find
+from realizer_studio.batch.task import Options, Task
+from realizer_studio.batch.worker import Outcome, Worker
 
 
 def names(*places: object) -> list[str]:

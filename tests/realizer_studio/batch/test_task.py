@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.batch.task import Options, fingerprint, key_of
+from realizer_studio.batch.task import Options, fingerprint, key_of
 
 OTHER = {
     "formats": (".json",),
