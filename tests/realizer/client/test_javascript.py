@@ -26,6 +26,10 @@ pytestmark = [
 ]
 CALLS = """
 import { Realizer, type Timed } from "bml-realizer-client";
+import { spokenText } from "bml-realizer-client/text";
+const said: string = spokenText("*Hi*", "en", { emoji: false }).behaviours[0]?.[1] ?? "";
+said.trim();
+await new Realizer().speak("Hi", { plain: true });
 const realizer = new Realizer({ url: "ws://127.0.0.1:8765/ws" });
 await realizer.connect();
 await realizer.faps({ fps: 25 }, (frame) => { const values: Int32Array = frame.values(); values.length; });

@@ -14,7 +14,8 @@ WORDS = r"""
 hello you A * ** _ ` ``` ~~~ ~~ [ ] ( ) [nod] (laughs) *smiles* *whistles¬on* *big* < > <b> & &amp;
 ¬ ¬ ¬  ¶ ¶¶ #¬ -¬ 1.¬ 2.¬ >¬ | |- --- === http://x.org/a <https://y.org> [a](b) [^1] [^1]:¬ [r]:¬ 😀
 :) <3 5 12 . ! ? \  2024 •¬ [¬]¬ ![ <!-- --> $5 World¬War¬ II 50% km/h ¬30 ¬May¬ ,¬ No.¬ – : / °C
-¬million¬ € ¬euros version¬ .5 Henry¬  VIII VI I <sync¬id='m'/>
+¬million¬ € ¬euros version¬ .5 Henry¬
+VIII VI I 5 p.m. USD¬ Mio. EUR <sync¬id='m'/>
 """
 PIECES = ["\r", "\t", *(word.replace("¬", " ").replace("¶", "\n") for word in WORDS.split())]
 MANY = 2**17  # characters
