@@ -73,6 +73,8 @@ class AudioStream:
         cached = self._cache.pop(key, None)
         if cached is None or cached[0] is not speech:
             cached = (speech, self._render(speech, number * BLOCK))
+            heard = {id(each) for each in self.speeches()}
+            self._cache = {key: kept for key, kept in self._cache.items() if key[0] in heard}
         self._cache[key] = cached
         while len(self._cache) > BLOCKS:
             del self._cache[next(iter(self._cache))]

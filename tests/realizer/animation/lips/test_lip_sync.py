@@ -1,5 +1,7 @@
 """Lips: known phonemes, and laws for any sequence of them."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -349,7 +351,15 @@ def test_opened_scales_the_mouth_and_leaves_closures(factor: float) -> None:
 
 def test_opened_remembers_its_result() -> None:
     assert opened(USUAL, 1.0) is USUAL
-    assert opened(USUAL, 1.3) is opened(USUAL, 1.3)
+    assert all(one is same for one, same in zip(opened(USUAL, 1.3), opened(USUAL, 1.3), strict=True))
     other = opened(USUAL, 0.7)
     assert isinstance(other[0], Channel)
     assert mouth_gap(other).max() < mouth_gap(opened(USUAL, 1.3)).max()
+
+
+def test_opened_keeps_no_channels_that_nothing_else_uses() -> None:
+    channels = tuple(channel.changed({"source": "other"}) for channel in USUAL)
+    known = [weakref.ref(channel) for channel in (*channels, *opened(channels, 1.3))]
+    del channels
+    gc.collect()
+    assert [ref() for ref in known if ref() is not None] == []

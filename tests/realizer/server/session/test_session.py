@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import json
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema.feedback import BlockProgress, WarningFeedback
+from realizer.animation.channel import Channel
 from realizer.core.errors import VoiceError
 from realizer.offline import realize
+from realizer.playback.active_block import ActiveBlock
+from realizer.playback.scheduled_speech import ScheduledSpeech
 from realizer.protocol.wire import unpack
 from realizer.speech.utterance import Phoneme, Utterance, Word
 from tests.realizer.server.conftest import NOD, RATE, TALK, Driver, spoken
@@ -521,3 +526,38 @@ def test_receive_sends_what_is_due_before_it_handles_a_late_message(driver, mess
     assert 'id="b:w:end"' in point
     assert 'status="DONE"' in end
     assert unpack(frame).frame == 13
+
+
+# memory -----------------------------------------------------------------------------------------
+
+SPOKEN = """<bml id="b{}"><speech id="told"><text>Hello there</text></speech>
+<head id="h" lexeme="NOD" start="told:start"/><faceLexeme id="f" lexeme="SMILE" end="told:end"/></bml>"""
+
+
+def alive_of_speeches() -> Counter[type]:
+    gc.collect()
+    found = [
+        o for o in gc.get_objects() if isinstance(o, Channel | ActiveBlock | ScheduledSpeech | Utterance)
+    ]
+    return Counter(type(o) for o in found if not isinstance(o, Channel) or str(o.source).endswith("told"))
+
+
+def play_spoken(driver: Driver, number: int) -> None:
+    sound = spoken()
+    phonemes = tuple(Phoneme(k / 5, (k + 1) / 5, ipa) for k, ipa in enumerate("hɛloʊ"))
+    driver.send(SPOKEN.format(number))
+    driver.say(number, Utterance(1.0, (Word(0.0, 1.0, "Hello"),), phonemes, {}, RATE, sound.pcm))
+    driver.run(driver.now + 8.0)
+
+
+def test_session_keeps_nothing_of_documents_that_have_ended() -> None:
+    driver = Driver(mute=True)
+    driver.send({"type": "subscribe", "stream": "fap", "fps": 25})
+    driver.send({"type": "subscribe", "stream": "audio"})
+    for number in range(1, 4):
+        play_spoken(driver, number)
+    before = alive_of_speeches()
+    for number in range(4, 9):
+        play_spoken(driver, number)
+    assert "b8:end" in driver.clients[1].ids
+    assert not alive_of_speeches() - before
