@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import base64
 import json
+import logging
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol, get_args
 
 from realizer.core.errors import RealizerError
+
+log = logging.getLogger(__name__)
 
 # Sessions whose process died and that no client resumed are deleted after this time.
 RETENTION = 7 * 24 * 3600  # s
@@ -66,7 +69,7 @@ class Entry:
             if kind not in get_args(Kind) or not isinstance(body, str | bytes):
                 raise ValueError(f"kind: wanted one of {', '.join(get_args(Kind))}, got {kind!r}")
             return cls(float(data["at"]), kind, int(data.get("number", 0)), body)
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as error:
             raise JournalError(f"wanted an entry of a journal, got {line[:80]!r}: {error}") from None
 
 
@@ -95,21 +98,31 @@ class SavedSession:
     ) -> SavedSession:
         """Parse the stored lines of a session.
 
+        A damaged entry of a journal costs no other one: it is set aside with a warning, and one whose time
+        alone is wrong is taken at the time of the entry before.
+
         Args:
-            place: prefix of error messages, before the number of the line; the head of a recording is line 1.
+            head: of a recording, which cannot be replayed with a gap.
+            place: prefix of messages, before the number of the line; the head of a recording is line 1.
 
         Raises:
-            JournalError: a line is not an entry, or its time is not finite or before that of the line above.
+            JournalError: a line of a recording is not an entry, or its time is not finite or before that of
+                the line above.
         """
         entries: list[Entry] = []
         for number, line in enumerate(lines, 2 if head else 1):
+            last = entries[-1].at if entries else 0.0
+            entry = Entry(last, "tick")  # does nothing
             try:
                 entry = Entry.read(line if isinstance(line, str) else line.decode())
-                check_time(entry.at, entries[-1].at if entries else 0.0)
-            except UnicodeDecodeError:
-                raise JournalError(f"{place}{number}: wanted UTF-8, got {quoted(line)!r}") from None
-            except (JournalError, ValueError) as error:
-                raise JournalError(f"{place}{number}: {error}") from None
+                check_time(entry.at, last)
+            except (JournalError, ValueError) as error:  # also for bytes that are not UTF-8
+                is_text = not isinstance(error, UnicodeDecodeError)
+                words = str(error) if is_text else f"wanted UTF-8, got {quoted(line)!r}"
+                if head is not None:
+                    raise JournalError(f"{place}{number}: {words}") from None
+                log.warning("%s%d is damaged, and set aside: %s", place, number, words)
+                entry = replace(entry, at=last)
             entries.append(entry)
         return cls(epoch, entries, parts, head or {})
 

@@ -133,7 +133,12 @@ class RedisJournal:
             return None
         epoch, lines, parts = answer
         self._counts[session] = len(lines)
-        return SavedSession.read(float(epoch), lines, dict(zip(parts[::2], parts[1::2], strict=True)))
+        return SavedSession.read(
+            float(epoch),
+            lines,
+            dict(zip(parts[::2], parts[1::2], strict=True)),
+            place=f"the journal of session {session}, entry ",
+        )
 
     def note(self, session: str, text: str | None) -> None:
         self._change(self._set_part, session, NOTE, text or "")

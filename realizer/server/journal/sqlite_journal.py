@@ -78,7 +78,8 @@ class SqliteJournal:
             entries = "SELECT line FROM entries WHERE session = ? ORDER BY n"
             lines = [line for (line,) in self._file.execute(entries, (session,))]
             parts = dict(self._file.execute("SELECT name, text FROM parts WHERE session = ?", (session,)))
-        return None if row is None else SavedSession.read(row[0], lines, parts)
+        place = f"the journal of session {session}, entry "
+        return None if row is None else SavedSession.read(row[0], lines, parts, place=place)
 
     def note(self, session: str, text: str | None) -> None:
         with self._transaction():

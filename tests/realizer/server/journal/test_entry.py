@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.server.journal.entry import Entry, JournalError, Kind
+from realizer.server.journal.entry import Entry, JournalError, Kind, SavedSession
 
 SECONDS = st.floats(0, 1e9)
 
@@ -42,3 +42,30 @@ NONE = """
 def test_entry_refuses_other_lines_and_quotes_them(line: str) -> None:
     with pytest.raises(JournalError, match="wanted an entry of a journal, got"):
         Entry.read(line)
+
+
+def test_saved_session_sets_damaged_entries_aside_one_by_one(caplog: pytest.LogCaptureFixture) -> None:
+    good = [Entry(1.0, "join", 1), Entry(2.0, "text", 1, "<bml/>"), Entry(3.0, "leave", 1)]
+    lines: list[str | bytes] = [entry.line() for entry in good]
+    early = Entry(0.5, "text", 1, "<bml id='b'/>").line()
+    damaged = [
+        b"\xff\xfe",
+        "{",
+        "[" * 100_000,
+        '{"at": ' + "1" * 5000 + "}",
+        '{"at": 1' + "0" * 400 + "}",
+        early,
+    ]
+    lines[2:2] = damaged
+    saved = SavedSession.read(0.0, lines, {}, place="entry ")
+    aside = [Entry(2.0, "tick")] * 5
+    assert saved.entries == [*good[:2], *aside, Entry(2.0, "text", 1, "<bml id='b'/>"), good[2]]
+    assert [f"entry {n} is damaged" in caplog.text for n in range(1, 10)] == [False] * 2 + [True] * 6 + [
+        False
+    ]
+
+
+def test_saved_session_refuses_a_recording_with_a_damaged_entry() -> None:
+    lines = [Entry(1.0, "join", 1).line(), "{"]
+    with pytest.raises(JournalError, match=r"^file:3: wanted an entry"):
+        SavedSession.read(0.0, lines, {}, {"session": "s"}, "file:")
