@@ -51,6 +51,7 @@ def _served_face(value: str | None) -> str | None:
     ("jwt_key", "FILE|SECRET"),
     ("jwt_audience", "WORD"),
     ("hosts", "NAME,..."),
+    ("forwarded_allow_ips", "ADDRESS,..."),
     ("allow", "ADDRESS,..."),
 )
 @option(

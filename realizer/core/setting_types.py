@@ -150,6 +150,11 @@ hosts = _several(_host_name, "names or addresses without a port, such as face.ex
 networks = _several(
     lambda text: str(ipaddress.ip_network(text, strict=False)), "addresses or networks such as 192.168.1.0/24"
 )
+# As uvicorn has them.
+proxies = _several(
+    lambda text: text if text == "*" else str(ipaddress.ip_network(text, strict=False)),
+    "addresses or networks of proxies such as 10.0.0.0/8, or *",
+)
 
 
 def key(value: Any) -> str:

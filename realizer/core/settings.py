@@ -108,6 +108,12 @@ class Settings:
         kind.hosts,
         "names under which clients reach the service, beside its addresses, the machine's name and localhost",
     )
+    forwarded_allow_ips: tuple[str, ...] = _row(
+        (),
+        kind.proxies,
+        "addresses and networks of proxies whose X-Forwarded-For is believed, for limits and the log, or *; "
+        "none: no proxy",
+    )
     allow: tuple[str, ...] = _row(
         (), kind.networks, "addresses and networks of the clients of Asap and Xface; none: all"
     )

@@ -60,7 +60,8 @@ class HttpServer:
             log_config=None,
             log_level="error",  # lower levels log addresses of requests, with their tokens
             access_log=False,
-            proxy_headers=False,
+            proxy_headers=bool(self._settings.forwarded_allow_ips),
+            forwarded_allow_ips=list(self._settings.forwarded_allow_ips),
         )
         self._config.load()
         if self._hub.worker is not None:

@@ -222,6 +222,25 @@ def test_websocket_limits_the_connections_of_an_address() -> None:
     serving(test, max_connections=20)
 
 
+@pytest.mark.parametrize(("trusted", "lets_in"), [("127.0.0.0/8", True), ("*", True), ("192.0.2.1", False)])
+def test_limits_count_by_client_behind_a_trusted_proxy_only(trusted: str, lets_in: bool) -> None:
+    async def test(server: Server) -> None:
+        async with dial(server.url, additional_headers={"X-Forwarded-For": "203.0.113.7"}):
+            other = dial(server.url, additional_headers={"X-Forwarded-For": "203.0.113.8"})
+            if lets_in:
+                async with other as client:
+                    await plays(client, "b")
+                other = dial(server.url, additional_headers={"X-Forwarded-For": "203.0.113.7"})
+            with pytest.raises(InvalidStatus) as caught:
+                await other
+            assert caught.value.response.status_code == 429
+            where = "203.0.113.7" if lets_in else "127.0.0.1"
+            assert f"1 connections from {where} are open".encode() in caught.value.response.body
+            assert int(caught.value.response.headers["Retry-After"]) > 0
+
+    serving(test, max_connections=1, forwarded_allow_ips=(trusted,))
+
+
 @pytest.mark.slow
 def test_websocket_survives_one_who_reconnects_again_and_again() -> None:
     async def test(server: Server) -> None:
