@@ -13,6 +13,7 @@ from realizer.animation.axis import au
 from realizer.animation.channel import Channel, Layer
 from realizer.behaviours.kind import Fault, PlanningContext, Position
 from realizer.core.array_types import Float64
+from realizer.core.json_reader import parse_json
 from realizer.core.similar import similar
 
 NUMBER = r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*"
@@ -114,13 +115,9 @@ def parse_scene(text: str) -> dict[str, Position]:
     Raises:
         ValueError: with the entry and the expected value.
     """
-    import json
-
     if text.lstrip().startswith("{"):
         try:
-            entries = json.loads(text)
-        except RecursionError:
-            raise ValueError("wanted targets, got JSON that is nested too deeply") from None
+            entries = parse_json(text)
         except ValueError as error:
             raise ValueError(f"wanted JSON, got: {error}") from None
         items = [(str(k), [*v.values()] if isinstance(v, dict) else v) for k, v in entries.items()]

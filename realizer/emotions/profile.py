@@ -13,7 +13,7 @@ import numpy as np
 from realizer import tables
 from realizer.core.array_types import Float32
 
-RANGE = re.compile(r"\s*F(\d+)\s*\[\s*([^,\[\]]+),([^,\[\]]+)\]\s*")
+RANGE = re.compile(r"\s*F(\d{1,3})\s*\[\s*([^,\[\]]+),([^,\[\]]+)\]\s*")
 OUTER = 47  # difference between FAPs of the outer and the inner lips (ISO/IEC 14496-2 annex C)
 
 

@@ -9,6 +9,7 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from realizer.core.errors import TableError
+from realizer.core.json_reader import parse_json
 from realizer.core.similar import did_you_mean, similar
 from realizer.core.toml_text import parse_toml
 from realizer.expressions.timeline import Curve, Entry, Joins, Mixer, Timeline, Track
@@ -44,8 +45,8 @@ def read_timeline(content: bytes) -> Timeline:
     """
     try:
         text = content.decode("utf-8-sig")
-        table = json.loads(text) if _is_json(text) else parse_toml(text)
-    except (ValueError, RecursionError) as error:  # also for integers of thousands of digits
+        table = parse_json(text) if _is_json(text) else parse_toml(text)
+    except ValueError as error:
         raise TableError(f"wanted a timeline in TOML or JSON, got: {error}") from None
     if not isinstance(table, dict):
         raise TableError(f'timeline: wanted {{"channel": [...]}}, got a {type(table).__name__}')

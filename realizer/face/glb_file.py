@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.array_types import Float32
+from realizer.core.json_reader import parse_json
 
 COMPONENTS = {"u1": 5121, "u2": 5123, "u4": 5125, "f4": 5126}
 KINDS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
@@ -149,7 +150,7 @@ def read_glb(raw: bytes) -> tuple[dict[str, Any], bytes]:
         ValueError: it is another file, or truncated.
     """
     text, data = chunks_of(raw)
-    document = json.loads(text)
+    document = parse_json(text)
     buffers = document.get("buffers") if isinstance(document, dict) else None
     if data is None or not buffers:
         raise ValueError("wanted a GLB file with meshes, got one without data")

@@ -6,12 +6,16 @@ Each is an entry point of the group `realizer.editors`; the editor `label` answe
 from __future__ import annotations
 
 import json
+import logging
 from collections.abc import Callable
 from typing import Protocol
 
 from realizer.core.errors import PluginError
+from realizer.core.json_reader import parse_json
 from realizer.core.registry import Registry
 from realizer.core.settings import Settings
+
+log = logging.getLogger(__name__)
 
 
 class Editor(Protocol):
@@ -44,15 +48,28 @@ class MissingEditor:
 
     def answer(self, message: str | bytes) -> str:
         """Return the fault as the answer to a message."""
-        text = message if isinstance(message, str) else message[4 : 4 + int.from_bytes(message[:4], "little")]
-        try:
-            number = json.loads(text).get("id")
-        except (ValueError, AttributeError, RecursionError):
-            number = None
-        return json.dumps({"id": number, "error": self._fault})
+        return _error(message, self._fault)
 
     def close(self) -> None:
         """Nothing is held."""
+
+
+def answer_of(editor: Editor, message: str | bytes) -> str | bytes:
+    """Return an editor's answer to a message; whatever fails costs this message only."""
+    try:
+        return editor.answer(message)
+    except Exception as error:
+        log.exception("an editor has no answer")
+        return _error(message, f"an error of the service ({type(error).__name__}): its log says which")
+
+
+def _error(message: str | bytes, fault: str) -> str:
+    text = message if isinstance(message, str) else message[4 : 4 + int.from_bytes(message[:4], "little")]
+    try:
+        number = parse_json(text).get("id")
+    except (ValueError, AttributeError):
+        number = None
+    return json.dumps({"id": number, "error": fault})
 
 
 def editor_of(name: str, settings: Settings, *, may_save: bool) -> Editor:

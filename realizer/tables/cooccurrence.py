@@ -17,7 +17,7 @@ Kind = Literal["domination", "exclusion", "inclusion", "opposition"]
 SIGNS: Mapping[str, str] = {"domination": "<", "exclusion": "@", "inclusion": "@", "opposition": "@"}
 SMALL = "X"  # the fuzzy set that exclusion and inclusion use
 MAX_DOMINANT = 2  # units that dominate another one together
-UNIT = re.compile(r"([0-9]+)([A-Za-z]?)")
+UNIT = re.compile(r"([0-9]{1,3})([A-Za-z]?)")
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ def read_aus(cells: Mapping[str, float], place: str, most: float = 1.0) -> dict[
     known = tables.by_number()
     aus = {}
     for cell, amount in cells.items():
-        match = re.fullmatch(r"(\d+)([LR]?)", cell)
+        match = re.fullmatch(r"(\d{1,3})([LR]?)", cell)
         au = known.get(int(match[1])) if match else None
         if match is None or au is None or (match[2] and not au.sides):
             raise TableError(f"{place}: wanted an action unit such as 12 or 12L, got {cell!r}")

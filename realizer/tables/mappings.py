@@ -155,8 +155,8 @@ def _read_text(text: str, path: Path) -> tuple[set[tuple[int, str]], list[Line]]
 
 
 def _whole(field: str, what: str, where: str) -> int:
-    if not (field.isascii() and field.isdecimal()):
-        raise TableError(f"{where}: wanted {what}, got {field!r}")
+    if not (field.isascii() and field.isdecimal() and len(field) < 6):
+        raise TableError(f"{where}: wanted {what}, got {field[:40]!r}")
     return int(field)
 
 

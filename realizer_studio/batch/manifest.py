@@ -9,6 +9,7 @@ from typing import Any, Self, TextIO
 
 from realizer.core.atomic_files import lock, write_text
 from realizer.core.errors import RealizerError
+from realizer.core.json_reader import parse_json
 
 NAME = "manifest.jsonl"
 LOCK = ".manifest.lock"
@@ -99,7 +100,7 @@ def _read(path: Path) -> Iterator[Row]:
         return
     for line in lines:
         try:
-            row = json.loads(line)
+            row = parse_json(line)
         except ValueError:
             continue
         if isinstance(row, dict) and {"document", "key", "status", "outputs"} <= row.keys():

@@ -2,7 +2,6 @@
 
 import csv
 import io
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -13,6 +12,7 @@ import numpy.typing as npt
 from realizer.animation.fap.fap_clip import FAPClip
 from realizer.animation.fap.fap_reader import INT32, read_fap
 from realizer.core.errors import RealizerError
+from realizer.core.json_reader import parse_json
 from realizer.outputs import fap_text
 from realizer.outputs.csv_table import csv_text
 from realizer.outputs.json_text import json_line
@@ -134,7 +134,7 @@ def _to_json(clip: FAPClip) -> str:
 
 def _from_json(text: str) -> FAPClip:
     try:
-        content = json.loads(text)
+        content = parse_json(text)
     except ValueError as error:
         raise RealizerError(f"wanted JSON, got {error}") from None
     fap = content.get("fap")

@@ -1,6 +1,5 @@
 """Readers and writers of other programs' files that belong to a recording."""
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
@@ -15,6 +14,7 @@ from realizer.animation.axis import au, axis
 from realizer.animation.fap.fap_reader import read_fap
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError, RealizerError
+from realizer.core.json_reader import parse_json
 from realizer.face.features import fapu_of
 from realizer.outputs.speech_spans import Span
 from realizer.outputs.textgrid import intervals_text
@@ -167,7 +167,7 @@ def _fap(text: str) -> Recording:
 
 
 def _json(text: str) -> Recording:
-    data = json.loads(text)
+    data = parse_json(text)
     if isinstance(data, dict):
         words = [Annotation(float(w["start"]), float(w["end"]), str(w["text"])) for w in data["words"]]
         return Recording("", words=tuple(words))

@@ -96,7 +96,7 @@ class Labelling:
                     rows.append({"name": path.name, "annotators": found.annotators, "names": names})
                 except CorpusError as error:
                     rows.append({"name": path.name, "error": str(error).replace(f"{self._folder}/", "")})
-        return {"corpus": str(self._folder), "recordings": rows, "editable": self._may_save}, {}
+        return {"corpus": self._corpus().name, "recordings": rows, "editable": self._may_save}, {}
 
     def _open(self, request: dict[str, Any]) -> Any:
         """Return a recording with its film or, without `film`, its points (frames, points, 2)."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from realizer.core.errors import RealizerError
+from realizer.core.json_reader import parse_json
 
 ALIGN = 8  # bytes; arrays begin at a multiple of it
 
@@ -42,10 +43,10 @@ def unpacked(message: str | bytes) -> tuple[dict[str, Any], bytes]:
     """
     try:
         if isinstance(message, str):
-            header, payload = json.loads(message), b""
+            header, payload = parse_json(message), b""
         else:
             (length,) = struct.unpack_from("<I", message)
-            header, payload = json.loads(message[4 : 4 + length]), message[4 + length :]
+            header, payload = parse_json(message[4 : 4 + length]), message[4 + length :]
     except (ValueError, struct.error) as error:
         raise RealizerError(f"wanted JSON, or a length, JSON and bytes: {error}") from None
     if not isinstance(header, dict):

@@ -251,7 +251,7 @@ def _is_mask(words: list[str]) -> bool:
     if len(words) not in COLUMNS:
         return False
     others = [word for word in words if word not in ("0", "1")]
-    return len(others) <= 1 and all(re.fullmatch(r"[+-]?\d+", word) for word in others)
+    return len(others) <= 1 and all(re.fullmatch(r"[+-]?\d{1,9}", word) for word in others)
 
 
 def _number(word: str) -> float | None:

@@ -8,6 +8,7 @@ from typing import Annotated, get_args
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
+from realizer.core.json_reader import parse_json
 from realizer.core.similar import similar
 from realizer.protocol.messages.common import MAX_CONTENT, MAX_CONTROL
 from realizer.protocol.messages.replies import ErrorMessage
@@ -59,9 +60,7 @@ def parse_control(text: str, *, can_save: bool = False) -> Control | ErrorMessag
     if len(text) > MAX_CONTROL and not (can_save and len(text) < 2 * MAX_CONTENT):
         return _too_large(text)
     try:
-        message = json.loads(text)
-    except RecursionError:
-        return ErrorMessage(code="bad-json", message="wanted a flat JSON object, got one nested too deeply")
+        message = parse_json(text)
     except ValueError as error:
         return ErrorMessage(code="bad-json", message=f"wanted a JSON object with a type: {error}")
     if _SURROGATE.search(text) and not _is_text(message):

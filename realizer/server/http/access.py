@@ -3,7 +3,6 @@
 import hashlib
 import hmac
 import ipaddress
-import json
 import logging
 import socket
 import ssl
@@ -15,6 +14,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from realizer.core.errors import RealizerError
+from realizer.core.json_reader import parse_json
 from realizer.core.settings import Settings, SettingsError, is_loopback
 from realizer.protocol.messages.common import MAX_CONTROL
 from realizer.server.documents.limits import memory_error
@@ -231,8 +231,8 @@ class AccessControl:
             JoinError: 401, it is not a `hello`, or has no token or a wrong one.
         """
         try:
-            hello = json.loads(message) if isinstance(message, str) and len(message) < MAX_CONTROL else None
-        except (ValueError, RecursionError):
+            hello = parse_json(message) if isinstance(message, str) and len(message) < MAX_CONTROL else None
+        except ValueError:
             hello = None
         if not isinstance(hello, dict) or hello.get("type") != "hello":
             words = "token: wanted one in the address, a header or a first hello, got none"

@@ -11,7 +11,7 @@ from urllib.parse import parse_qsl
 from realizer.core.settings import Settings, limit_hint
 from realizer.core.similar import did_you_mean, similar
 from realizer.protocol.messages.replies import ErrorCode, ErrorMessage
-from realizer.server.editors import EDITORS, editor_of
+from realizer.server.editors import EDITORS, answer_of, editor_of
 from realizer.server.http import access
 from realizer.server.http.access import AccessControl, Grant
 from realizer.server.http.socket_client import SocketClient
@@ -185,7 +185,7 @@ class WebSocketConnections:
         try:
             while (message := await client.receive()) is not None:
                 async with turn:  # one at a time for all pages, because each may take seconds
-                    answer = await loop.run_in_executor(None, editor.answer, message)
+                    answer = await loop.run_in_executor(None, answer_of, editor, message)
                 await client.send_all(answer)
         finally:
             await loop.run_in_executor(None, editor.close)

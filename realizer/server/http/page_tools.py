@@ -8,6 +8,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError
+from realizer.core.json_reader import parse_json
 from realizer.core.settings import Settings
 
 if TYPE_CHECKING:
@@ -139,8 +140,8 @@ def export_pose(message: str, face: str | None, settings: Settings) -> str:
 
 def _object(text: str) -> dict[str, Any]:
     try:
-        value = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        value = parse_json(text)
+    except ValueError as error:
         raise ToolError(f"wanted a JSON object: {error}") from None
     if not isinstance(value, dict):
         raise ToolError(f"wanted a JSON object, got {type(value).__name__}")

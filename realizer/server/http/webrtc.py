@@ -12,6 +12,7 @@ from typing import Any
 
 from aiortc import RTCConfiguration, RTCPeerConnection, RTCSessionDescription
 
+from realizer.core.json_reader import parse_json
 from realizer.protocol.wire import unpack
 from realizer.server.http.openapi import VIDEO
 from realizer.server.http.tracks import RATE, PictureTrack, Playout, SoundTrack
@@ -171,8 +172,8 @@ def offer_of(body: bytes) -> tuple[str, bool]:
     text = body.decode("utf-8", "replace").strip()
     if not text.startswith("{"):
         return text + "\r\n", False
-    with contextlib.suppress(ValueError, RecursionError):
-        offer = json.loads(text)
+    with contextlib.suppress(ValueError):
+        offer = parse_json(text)
         if offer.get("type") == "offer" and isinstance(offer.get("sdp"), str):
             return offer["sdp"], True
     words = f'offer: wanted SDP, or {{"type": "offer", "sdp": "..."}}, got {text[:80]!r}'

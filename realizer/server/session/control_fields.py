@@ -44,14 +44,14 @@ def direct_values(message: SetMessage, before: Collection[str]) -> dict[str, flo
     for name, value in (message.aus or {}).items():
         names = [n for n in (name, f"{name}L", f"{name}R") if n in AU_NAMES()]
         if not names:
-            raise FieldError("aus", f"wanted an AU number, with L or R for one side, got {name!r}")
+            raise FieldError("aus", f"wanted an AU number, with L or R for one side, got {name[:80]!r}")
         values |= dict.fromkeys(names, value)
     movable = {row.name for row in rows[2:]}  # FAP 1 and 2 select visemes and expressions
     for name, value in (message.faps or {}).items():
-        if name.isascii() and name.isdigit() and 3 <= int(name) <= len(rows):
+        if name.isascii() and name.isdigit() and len(name) < 4 and 3 <= int(name) <= len(rows):
             name = rows[int(name) - 1].name
         if name not in movable:
-            raise FieldError("faps", f"wanted the name or the number (3..68) of a FAP, got {name!r}")
+            raise FieldError("faps", f"wanted the name or the number (3..68) of a FAP, got {name[:80]!r}")
         values[name] = value
     return values
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from urllib.parse import quote, unquote_plus
 
 from bml_schema import WarningFeedback
+from realizer.core.json_reader import parse_json
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +90,8 @@ class AsapJson(AsapXml):
     def _decode(self, body: bytes) -> str:
         wanted = 'wanted {"bml": {"content": "URL-encoded BML"}}, got '
         try:
-            message = json.loads(body)
-        except (ValueError, RecursionError) as error:
+            message = parse_json(body)
+        except ValueError as error:
             raise ValueError(f"{wanted}no JSON: {error}"[:200]) from None
         bml = message.get("bml") if isinstance(message, dict) else None
         content = bml.get("content") if isinstance(bml, dict) else None

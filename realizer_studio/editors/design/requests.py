@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from realizer.core.errors import RealizerError, TableError
+from realizer.core.json_reader import parse_json
 from realizer.core.settings import Settings
 from realizer.expressions.expression import Expression
 from realizer.expressions.library import library_of
@@ -48,7 +49,7 @@ class Designer:
         try:
             if len(message) > MAX_REQUEST:
                 raise RealizerError(f"wanted at most {MAX_REQUEST} characters, got {len(message)}")
-            request = json.loads(message)
+            request = parse_json(message)
             if not isinstance(request, dict):
                 raise RealizerError("wanted a JSON object")
             number = request.get("id")
@@ -56,7 +57,7 @@ class Designer:
                 raise RealizerError(f"tool: wanted one of {', '.join(TOOLS)}")
             found = {"id": number, **tool(request, self._settings)}
             return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
-        except (RealizerError, ValueError, TypeError, KeyError, RecursionError) as error:
+        except (RealizerError, ValueError, TypeError, KeyError, OverflowError) as error:
             text = error.args[0] if isinstance(error, KeyError) and error.args else error
             return json.dumps({"id": number, "error": str(text)})
 

@@ -3,6 +3,7 @@
 import errno
 import hashlib
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -166,7 +167,11 @@ class Studio:
         face = self._draft(request) if "setup" in request else load_folder(self._source(), "mpeg4")
         row = np.zeros((1, FAPS), np.float32)
         for fap, value in request.get("values", {}).items():
-            if not str(fap).isdecimal() or not 3 <= int(fap) <= FAPS or not isinstance(value, int | float):
+            if (
+                not re.fullmatch("[0-9]{1,2}", fap)
+                or not 3 <= int(fap) <= FAPS
+                or not isinstance(value, int | float)
+            ):
                 raise FaceError(f"values: wanted numbers by FAP, 3 to {FAPS}, got {str(fap)[:40]!r}")
             row[0, int(fap) - 1] = value
         return {}, {"vertices": deform(face, row)[0]}

@@ -7,7 +7,6 @@ normalised and strided accessors that heads need.
 import base64
 import binascii
 import io
-import json
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -17,6 +16,7 @@ from PIL import Image, UnidentifiedImageError
 
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
+from realizer.core.json_reader import parse_json
 from realizer.face.glb_file import chunks_of
 from realizer_studio.faces.arkit.gltf_schema import document_fault
 from realizer_studio.faces.arkit.meshopt import EXTENSIONS, unpack
@@ -55,8 +55,8 @@ class Gltf:
         self._binary: bytes | None = None
         text = self._chunks(raw) if raw[:4] == b"glTF" else raw
         try:
-            self.json: dict[str, Any] = json.loads(text)
-        except (ValueError, RecursionError):
+            self.json: dict[str, Any] = parse_json(text)
+        except ValueError:
             raise FaceError(
                 f"{path}: wanted a GLB file (binary glTF 2.0) or a .gltf, got neither; export the head again"
             ) from None

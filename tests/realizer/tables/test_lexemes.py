@@ -71,3 +71,9 @@ def test_read_aus_parses_sides() -> None:
 def test_read_aus_refuses_invalid_units_and_intensities(cells: dict[str, float], words: str) -> None:
     with pytest.raises(TableError, match=words):
         read_aus(cells, "x")
+
+
+@pytest.mark.parametrize("unit", ["9" * 5000, "9" * 5000 + "L", "0", "999"])
+def test_read_aus_refuses_numbers_that_are_no_action_unit(unit: str) -> None:
+    with pytest.raises(TableError, match="wanted an action unit such as 12 or 12L"):
+        read_aus({unit: 1.0}, "x")

@@ -165,3 +165,12 @@ def test_read_fap_reads_or_refuses_any_text(text):
         assert read_fap(text).values.shape[1:] == (68,)
     except RealizerError as error:
         assert "wanted" in str(error)  # noqa: PT017
+
+
+@pytest.mark.parametrize("digits", [20, 5000])
+def test_read_fap_refuses_or_reads_numbers_of_thousands_of_digits(digits: int) -> None:
+    number = "9" * digits
+    with pytest.raises(RealizerError, match="wanted a"):
+        read_fap(f"2.1 x 25 1\n{mask(JAW).replace('1', number, 1)}\n0 100\n")
+    clip = read_fap(f"2.1 x 25 {number}\n{mask(JAW)}\n0 {number}\n")
+    assert len(clip.values) == 1

@@ -49,6 +49,12 @@ def test_direct_values_names_the_field_of_an_unknown_name(message: SetMessage, w
     assert says in str(wrong.value)
 
 
+def test_direct_values_refuses_a_number_of_thousands_of_digits() -> None:
+    for fields in ({"faps": {"9" * 5000: 1}}, {"aus": {"9" * 5000: 1}}):
+        with pytest.raises(FieldError, match="wanted"):
+            direct_values(make(**fields), [])
+
+
 def test_emotion_values_are_the_aus_of_an_emotion() -> None:
     assert emotion_values(None) == {}
     assert emotion_values(EmotionFields(name="joy"))["12L"] > 0
