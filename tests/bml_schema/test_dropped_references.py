@@ -17,7 +17,7 @@ from bml_schema import (
     without,
     write,
 )
-from bml_schema.dropped_references import ReferenceRemover
+from bml_schema.dropped_references import ReferenceRemover, without_references
 from tests.strategies import blocks
 
 
@@ -145,3 +145,16 @@ def test_dropped_references_leave_the_language_of_a_text() -> None:
     speech = block["s"]
     assert isinstance(speech, Speech)
     assert speech.text == SpeechText(parts=("a", Sync(id="m")), language="nl")
+
+
+def test_without_references_removes_those_of_some_points() -> None:
+    block = only(
+        "<wait id='w' start='1' end='3'/>"
+        "<constraint><before ref='w:end'><sync ref='w:start'/></before></constraint>"
+        "<speech id='s' start='w:end'><text>a <sync id='m' ref='4'/>b</text></speech>"
+    )
+    assert without_references(block, ()) is block
+    rest = without_references(block, {"w:end", "s:m"})
+    assert list(rest["w"].syncs) == ["start"]
+    assert [point for point, _ in rest["s"].references] == ["start"]
+    assert len(rest.constraints) == 1

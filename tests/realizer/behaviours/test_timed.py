@@ -47,3 +47,21 @@ def test_wait_keeps_its_duration_and_stretches_what_is_tied_to_it() -> None:
     for duration in (0.8 * alone, 1.3 * alone, 3 * alone):
         assert length(tied.format(f'duration="{duration}"')) == pytest.approx(duration, rel=0.02)
     assert length(tied.format("")) == pytest.approx(alone, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("syncs", "says"),
+    [
+        ('start="0" end="1"', "it is 1 s shorter"),
+        ('start="0" end="w:start + 5"', "it is 3 s longer"),
+        ('start="x:start" end="x:start + 1"', "it is 1 s shorter"),
+        ('start="0" end="2"', ""),
+        ('start="0"', ""),
+        ('start="x:start" end="x:end"', ""),  # both can move
+    ],
+)
+def test_wait_that_states_another_duration_than_its_times_has_a_warning(play, syncs: str, says: str) -> None:
+    played = play(f'<wait id="w" duration="2" {syncs}/><wait id="x" duration="2"/>')
+    assert played.times("w")
+    assert [id for id, _ in played.warnings] == ["b:w"] * bool(says)
+    assert not says or says in played.warnings_text

@@ -105,6 +105,28 @@ def test_realize_writes_nothing_if_no_block_was_accepted(tmp_path: Path, text: s
     assert out.read_bytes() == b"of before"
 
 
+@pytest.mark.parametrize(
+    ("inside", "status"),
+    [
+        ('<faceLexeme id="f" lexeme="NOPE"/>', 1),
+        ('<speech id="s"><text> </text></speech>', 1),
+        ('<gesture id="g" lexeme="BEAT" start="nobody:end"/>', 1),
+        ('<wait id="w" duration="1"/>', 0),
+        ('<faceLexeme id="f" lexeme="NOPE"/><head id="h" lexeme="NOD"/>', 0),
+        ('<speech id="s" start="0" end="0.2"><text>My name is Sam.</text></speech>', 0),
+        ("", 0),
+    ],
+)
+def test_realize_exits_with_1_if_something_was_asked_for_and_nothing_plays(
+    tmp_path: Path, inside: str, status: int
+) -> None:
+    command = ["-q", "realize", "-", "-o", str(tmp_path / "x.json"), "--voice", "silent"]
+    done = CliRunner().invoke(cli, command, input=f'<bml id="b">{inside}</bml>', standalone_mode=False)
+    assert done.return_value == status
+    assert ("nothing is heard or moves" in done.stderr) == bool(status)
+    assert (tmp_path / "x.json").is_file()
+
+
 @pytest.mark.parametrize("command", ["realize -o out/0.json", "batch -o out --format json"])
 def test_realize_on_a_full_disk_names_the_file_and_leaves_no_part(tmp_path: Path, command: str) -> None:
     (tmp_path / "0.bml").write_text(TALK)

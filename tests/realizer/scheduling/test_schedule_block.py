@@ -564,6 +564,52 @@ def test_schedule_drops_one_of_three_in_a_circle() -> None:
     assert found["b"] == {"start": 1.0, "end": 2.0}
 
 
+# Statements that are given up, so that behaviours stay.
+
+
+def test_schedule_gives_up_the_last_reference_of_speech_before_its_start() -> None:
+    body = saying("s", marks=1, start="1", end="1.5")
+    found = schedule(body, {"s": speech(0.5, 2.0)})
+    assert found["s"] == {"start": 1.0, "m1": 1.5, "end": 3.0}
+    assert found.released == ("s:end",)
+    assert "s:end = 1.5 was given up" in found.warnings[0].text
+    assert "s:end is 1.5 s later" in found.warnings[0].text
+
+
+def test_schedule_drops_what_contradicts_speech_that_states_nothing_else() -> None:
+    body = wait("w", start="s:end", end="1") + saying("s", start="0")
+    found = schedule(body, {"s": speech(2.0), "w": timing([1.0])})
+    assert dropped(found) == ["b1:w"]
+    assert found["s"] == {"start": 0.0, "end": 2.0}
+
+
+def test_schedule_gives_up_a_start_of_speech_that_goes_in_a_circle() -> None:
+    body = wait("w", start="s:end") + saying("s", start="w:end")
+    found = schedule(body, {"s": speech(2.0), "w": timing([1.0])})
+    assert found.released == ("s:start",)
+    assert found["w"] == {"start": 2.0, "end": 3.0}
+
+
+def test_schedule_gives_up_references_of_speech_that_have_no_time() -> None:
+    body = saying("s", start="b9:x:end") + wait("w", start="b9:x:end")
+    found = schedule(body, {"s": speech(2.0), "w": timing([1.0])})
+    assert sorted(dropped(found)) == ["b1:s", "b1:w"]
+    assert list(found.times) == ["s"]
+    assert "s:start was given up" in next(w.text for w in found.warnings if w.id == "b1:s")
+
+
+def test_schedule_refuses_a_block_whose_required_speech_contradicts_itself() -> None:
+    body = f"<required>{saying('s', start='0', end='0.5')}</required>"
+    assert schedule(body, {"s": speech(2.0)}).failed
+
+
+@pytest.mark.parametrize("syncs", [{"start": "w:end"}, {"end": "w:start"}, {"end": "w:start - 1"}])
+def test_schedule_leaves_a_behaviour_its_length(syncs: dict[str, str]) -> None:
+    found = schedule(wait("w", **syncs), {"w": timing([1.0])})
+    assert found["w"] == {"start": 0.0, "end": 1.0}
+    assert "would leave it no length" in found.warnings[0].text
+
+
 # Other blocks.
 
 
