@@ -52,8 +52,8 @@ class FeedbackLog:
     """
 
     def __init__(self, epoch: float | None = None) -> None:
+        self.epoch = epoch
         self.newest = 0  # seq of the last message, 0 before the first
-        self._epoch = epoch
         self._packs: deque[_Pack] = deque()
         self._recent: list[str] = []
         self._unpacked = 0  # characters of `_recent`
@@ -68,7 +68,7 @@ class FeedbackLog:
     def add(self, feedback: Feedback, now: float) -> str:
         """Number and store a message, and return its text."""
         self.newest += 1
-        text = feedback.to_xml(self.newest, self._epoch)
+        text = feedback.to_xml(self.newest, self.epoch)
         self._store(text, now)
         return text
 

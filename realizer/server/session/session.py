@@ -9,7 +9,7 @@ import json
 import logging
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 from bml_schema import BMLError, WarningFeedback
 from bml_schema.encodings import decode
@@ -42,18 +42,6 @@ from realizer.server.streams.broadcast import Broadcast
 from realizer.speech.utterance import Utterance
 
 log = logging.getLogger(__name__)
-
-
-class Remains(NamedTuple):
-    """What clients need of the parts of a session that has failed."""
-
-    clock: SessionClock
-    log: FeedbackLog
-    connections: dict[int, Connection]
-    journal: SessionJournal
-    tracked: TrackedFaces
-    broadcast: Broadcast
-    is_ending: bool
 
 
 class Session:
@@ -93,11 +81,17 @@ class Session:
         self.is_ending = False
         self.empty_since: float | None = now
         self.failures: list[float] = []  # when it was recovered lately, on the host's clock
-        self._scene, self._capabilities, self._epoch = scene, capabilities or {}, epoch
+        self._scene, self._capabilities = scene, capabilities or {}
         self._effects: list[Effect] = []
-        self._make_parts(now, log or FeedbackLog(epoch))
+        self.make_parts(now, log or FeedbackLog(epoch))
 
-    def _make_parts(self, now: float, log: FeedbackLog) -> None:
+    def make_parts(self, now: float, log: FeedbackLog) -> None:
+        """Make the parts of a new session, or anew those of one that has failed.
+
+        Args:
+            now: the session clock starts here.
+            log: the log that feedback is added to.
+        """
         id, settings = self.id, self.settings
         self.clock = SessionClock(now)
         self.faces = CharacterFaces(settings)
@@ -313,39 +307,6 @@ class Session:
         closing = [Close(connection, 1012, str(error)) for connection in self.connections]
         self.close()
         self._effects += closing
-
-    def start_anew(self) -> Remains:
-        """Make all parts anew, at 0 of a clock, for a replay; return what clients need of the old ones."""
-        remains = Remains(
-            self.clock, self.feedback_log, dict(self.connections), self.journal, self.tracked, self.broadcast,
-            self.is_ending,
-        )  # fmt: skip
-        self._effects.clear()
-        self.is_ending = False
-        self._make_parts(0.0, FeedbackLog(self._epoch))
-        return remains
-
-    def continue_from(self, remains: Remains, now: float) -> None:
-        """Go on after a replay with the clients, the clock, the feedback log and the journal of before.
-
-        Feedback that the replay has made beyond what was sent is sent; subscriptions go on where they were.
-        """
-        self.clock.opened, self.is_ending = remains.clock.opened, remains.is_ending
-        t, log, replayed = self.clock.read(now), remains.log, self.feedback_log
-        texts = replayed.since(log.newest + 1)
-        log.restore(max(log.newest, replayed.newest), texts, t)
-        self.feedback_log = self.connections.log = self.journal.checkpoint.feedback_log = log
-        remains.journal.go_on(self.journal.checkpoint, self.connections)
-        self.journal = remains.journal
-        self.tracked.cameras = remains.tracked.cameras
-        self.broadcast.counts = self.submission.counts = remains.broadcast.counts
-        self.broadcast.overload = remains.broadcast.overload
-        self.connections.replace(remains.connections)
-        for connection in self.connections.values():
-            self.subscriptions.renew(connection, t)
-        self.broadcast.set_subscribers(self.connections.values())
-        self.take_effects()  # the clients know all of that
-        self.connections.send_unsent_feedback()
 
     def compact_journal(self, now: float) -> None:
         """Replace the journal by a checkpoint if it has grown; due feedback is published first."""
