@@ -32,10 +32,10 @@ from realizer_studio.corpus.recording import (
     CorpusError,
     Recording,
     numbers,
-    rate_of,
     read_annotations,
     read_faps,
 )
+from realizer_studio.tracking.person_recording import rate_of
 
 WORD_TIER = re.compile(r"words?\b\s*(.*)", re.IGNORECASE)
 INTERVAL = re.compile(r'xmin = ([\d.eE+-]+)\s*xmax = ([\d.eE+-]+)\s*text = "((?:[^"]|"")*)"')

@@ -20,6 +20,7 @@ from realizer.core.errors import TableError
 from realizer.core.toml_text import parse_toml
 from realizer.outputs.csv_table import csv_text
 from realizer.tables import faps
+from realizer_studio.tracking.person_recording import rate_of
 
 CORPUS, META, FAPS, POINTS = "corpus.toml", "meta.toml", "faps.csv", "points.npz"
 LABELS, WORDS = "labels.csv", "words.csv"
@@ -229,12 +230,6 @@ def numbers(text: str) -> dict[str, Float64]:
             raise ValueError(f"line {line} with {len(row)} cells, where the first has {len(head)}")
     table = np.array([[number(cell) for cell in row] for row in rows]).reshape(len(rows), len(head))
     return {name: table[:, k] for k, name in enumerate(head)}
-
-
-def rate_of(times: Float64) -> float:
-    """Return the frames per second of times in seconds, 25 for fewer than two different times."""
-    usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    return round(1 / usual, 3) if usual > 0 else 25.0
 
 
 Spans = Iterable[tuple[float, float, str]]

@@ -48,10 +48,13 @@ def record(person: Person, times: Sequence[float], fps: float, neutral: Person |
     return _resampled(measured, np.asarray(times), np.asarray(person.frames), fps)
 
 
-def rate_of(times: Sequence[float]) -> float:
-    """Return the frames per second of pictures at some times, by the median step, which ignores gaps."""
-    steps = np.diff(times)
-    return round(float(1 / np.median(steps)), 3) if len(steps) else 25.0
+def rate_of(times: Sequence[float] | Float64) -> float:
+    """Return the frames per second of pictures at some times, by the median step, which ignores gaps.
+
+    It is 25 for fewer than two different times.
+    """
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    return round(1 / step, 3) if step > 0 else 25.0
 
 
 def _at_rest(face_components: Components) -> Float64:

@@ -68,7 +68,8 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
         "occlusion": found.get("occlusionTexture"),
         "emission": found.get("emissiveTexture"),
     }
-    notes = [f"{extension} is not drawn" for extension in more if _is_undrawn(extension)]
+    kinds = "KHR_materials_", "EXT_materials_"
+    notes = [f"{name} is not drawn" for name in more if name.startswith(kinds) and name not in DRAWN]
     if "KHR_materials_unlit" in more:
         notes.append("unlit in the file, here light falls on it as on all others")
     textures: dict[str, Texture] = {}
@@ -95,10 +96,6 @@ def read_material(gltf: Gltf, number: int | None) -> tuple[Material, tuple[str, 
         tuple(textures.items()),
     )
     return material, tuple(notes)
-
-
-def _is_undrawn(extension: str) -> bool:
-    return extension.startswith(("KHR_materials_", "EXT_materials_")) and extension not in DRAWN
 
 
 def _coordinates(chart: Chart) -> tuple[Any, ...]:

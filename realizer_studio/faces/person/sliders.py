@@ -28,7 +28,7 @@ DEFAULTS: Mapping[str, Any] = {
 
 def person_faults(person: Mapping[str, Any]) -> list[str]:
     """Return a sentence for each fault in the table [person] of a recipe."""
-    table = _table()
+    table = toml_table("person.toml")
     faults = []
     keys = (*DEFAULTS, *table["sliders"])
     for key, value in person.items():
@@ -77,10 +77,6 @@ def description_of(person: Mapping[str, Any]) -> str:
     return f"A {word} of about {age:g}"
 
 
-def _table() -> dict[str, Any]:
-    return toml_table("person.toml")
-
-
 def is_number(value: Any) -> bool:
     """Return whether a value of a recipe is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
@@ -102,7 +98,7 @@ def _people_faults(people: Any) -> list[str]:
 
 def _targets(values: Mapping[str, Any]) -> dict[str, float]:
     """Return the weight of each shape target."""
-    table, out = _table(), Counter[str]()
+    table, out = toml_table("person.toml"), Counter[str]()
     total = sum(values["people"].values())
     old = _share(values["age"], YOUNG, OLD)
     builds = {"muscle": values["muscle"], "weight": values["weight"]}
@@ -130,7 +126,7 @@ def _between(amount: float, what: str) -> list[tuple[str, float]]:
 
 
 def _colours(values: Mapping[str, Any]) -> dict[str, list[float]]:
-    table = _table()
+    table = toml_table("person.toml")
     tones = np.array(table["skin"]["tones"], float)
     tone = values["skin"] * (len(tones) - 1)
     skin = np.array([np.interp(tone, np.arange(len(tones)), channel) for channel in tones.T])

@@ -108,10 +108,12 @@ def recipe_of(
     up = points[TOP] - points[CHIN]
     found = np.median([_colour(pixels, points[TOP] + share * up) for share in ABOVE], axis=0)
     rim = _rim(pixels, points, skin) if _colour_difference(found, skin) < ALIKE else None
+    hairs = {name: row["colour"] for name, row in table["hair_colours"].items()}
+    eyes = {name: row["colours"][1] for name, row in table["eye_colours"].items()}
     found_sliders = {
         "skin": round(tone / 199, 3),
-        "hair": _nearest(found if rim is None else rim, _hairs()),
-        "eyes": _nearest(_iris(pixels, front), _eyes()),
+        "hair": _nearest(found if rim is None else rim, hairs),
+        "eyes": _nearest(_iris(pixels, front), eyes),
     }
     sliders = {**person, **found_sliders, **fixed}
     tables = person_tables(sliders)
@@ -127,14 +129,6 @@ def recipe_of(
         # The sampled colour includes grey hair.
         "hair": {"style": style, "grey": 0.0},
     }
-
-
-def _hairs() -> dict[str, Any]:
-    return {name: row["colour"] for name, row in toml_table("person.toml")["hair_colours"].items()}
-
-
-def _eyes() -> dict[str, Any]:
-    return {name: row["colours"][1] for name, row in toml_table("person.toml")["eye_colours"].items()}
 
 
 def _colour(pixels: Float64, position: Any) -> Float64:

@@ -153,13 +153,10 @@ def _deepest(one: Any, other: Any) -> Any:
 
 def regions(lines: list[Line]) -> tuple[str, ...]:
     """Return the names of the regions whose folds have separate amounts: a drive and a side."""
-    return tuple(sorted({name for line in lines for name in line.drives} | set(_fields_drives())))
-
-
-def _fields_drives() -> list[str]:
     table = toml_table("skin_lines.toml")
     drives = {table["around_mouth"]["drive"], table["dimples"]["drive"]}
-    return [f"{drive}_{side}" for drive in drives for side in SIDES.values()]
+    names = {f"{drive}_{side}" for drive in drives for side in SIDES.values()}
+    return tuple(sorted(names.union(*(line.drives for line in lines))))
 
 
 def weights(skin: Skin, lines: list[Line], normals: Float64) -> Float32:
