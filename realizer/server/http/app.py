@@ -15,13 +15,11 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
 from starlette.applications import Starlette
-from starlette.datastructures import MutableHeaders
-from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
-from starlette.requests import ClientDisconnect, HTTPConnection, Request
+from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route, WebSocketRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from bml_schema import BMLError
@@ -29,8 +27,9 @@ from bml_schema.encodings import decode
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.http.connections import SOCKETS, session_of
-from realizer.server.http.http_site import FRAMES, JSON
-from realizer.server.http.hub import ENDING, Hub, address_of
+from realizer.server.http.guard import Guard, path_of, refuse_method
+from realizer.server.http.http_site import JSON
+from realizer.server.http.hub import Hub, address_of
 from realizer.server.http.metrics import MEDIA_TYPE
 from realizer.server.http.openapi import FINDING, description
 from realizer.server.http.page_tools import MAX_TEXT
@@ -45,9 +44,6 @@ log = logging.getLogger(__name__)
 
 KEEP_ALIVE = 15.0  # s; proxies close connections in which nothing comes
 MOST_UNREAD = 10_000  # messages; a client that reads no more of its feedback is disconnected
-RETRY = "5"  # s; when one that was refused for want of room may try again
-# Paths whose errors are JSON.
-API = re.compile("/(realize|check|openapi[.]json|sessions(/.*)?)$")
 SEQ = re.compile(r'\bseq="(\d+)"')
 
 
@@ -85,90 +81,12 @@ def application(hub: Hub) -> Starlette:
     app = Starlette(
         routes=[WebSocketRoute("/{path:path}", partial(_socket, hub)), *routes],
         middleware=[Middleware(Guard, hub)],
-        exception_handlers={405: _refuse_method},
+        exception_handlers={405: refuse_method},
         lifespan=hub.lifespan,
     )
     # A route for any path would also answer requests by a wrong method for the paths above.
     app.router.default = Route("/", partial(_site, hub), methods=["GET"]).handle
     return app
-
-
-class Guard:
-    """Middleware that checks the host of a request, answers refusals, and says who may read an answer."""
-
-    def __init__(self, app: ASGIApp, hub: Hub) -> None:
-        self._app = app
-        self._hub = hub
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] == "lifespan":
-            await self._app(scope, receive, send)
-            return
-        hub = self._hub
-        await hub.ready()
-        connection, path = HTTPConnection(scope), path_of(scope)
-        headers = dict(connection.headers)
-        has_begun = False
-
-        async def send_on(message: Message) -> None:
-            nonlocal has_begun
-            has_begun = True
-            if message["type"].endswith("http.response.start"):
-                answer = MutableHeaders(scope=message)
-                origin = hub.access.origin_of_reader(path, headers)
-                if origin is not None:
-                    answer["Access-Control-Allow-Origin"] = origin
-                answer["Vary"] = "Origin"
-                answer["X-Content-Type-Options"] = "nosniff"
-                answer.setdefault("Content-Security-Policy", FRAMES)
-                if hub.worker is not None:  # the next request may be for a session of another worker
-                    answer["Connection"] = "close"
-                if (status := message["status"]) >= 400:
-                    hub.sessions.metrics.counts["http_errors" if status < 500 else "http_failures"] += 1
-            await send(message)
-
-        try:
-            hub.access.check_host(headers)
-            if hub.sessions.is_ending and scope["type"] == "http" and API.match(path):
-                raise JoinError(HTTPStatus.SERVICE_UNAVAILABLE, ENDING)
-            await self._app(scope, receive, send_on)
-        except ClientDisconnect:
-            pass
-        except JoinError as error:
-            await self._refusal(error, connection, path)(scope, receive, send_on)
-        except Exception:
-            if has_begun:
-                raise
-            log.exception("there is no answer to %s %s", scope.get("method", "a WebSocket at"), path)
-            fault = JoinError(HTTPStatus.INTERNAL_SERVER_ERROR, "an error of the service: its log says which")
-            await self._refusal(fault, connection, path)(scope, receive, send_on)
-
-    def _refusal(self, error: JoinError, connection: HTTPConnection, path: str) -> Response:
-        self._hub.sessions.metrics.counts["refused"] += 1
-        self._hub.access.log_refusal(error, address_of(connection))
-        headers = {"WWW-Authenticate": "Bearer"} if error.status == HTTPStatus.UNAUTHORIZED else {}
-        if error.retry:
-            headers["Retry-After"] = RETRY
-        if API.match(path) and connection.scope["type"] == "http":
-            return JSONResponse({"error": str(error)}, error.status, headers)
-        return PlainTextResponse(f"{error}\n", error.status, headers)
-
-
-def path_of(scope: Scope) -> str:
-    """Return the path of a request inside the application, which may be mounted in another one."""
-    path: str = scope["path"]
-    return path.removeprefix(scope.get("root_path", ""))
-
-
-async def _refuse_method(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    assert error.headers is not None
-    allowed = error.headers["Allow"]
-    wanted = " or ".join(sorted(name.strip() for name in allowed.split(",")))
-    words = f"wanted {wanted} {request.url.path}, got {request.method}"
-    if API.match(path_of(request.scope)):
-        return JSONResponse({"error": words}, HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": allowed})
-    return PlainTextResponse(f"{words}\n", HTTPStatus.METHOD_NOT_ALLOWED, {"Allow": allowed})
 
 
 async def _socket(hub: Hub, socket: WebSocket) -> None:

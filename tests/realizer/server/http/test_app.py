@@ -15,7 +15,6 @@ from websockets.sync.client import connect
 
 from realizer.server.http.access import LEEWAY
 from realizer.server.http.app import event_of
-from realizer.server.runtime.session_registry import JoinError
 from tests.realizer.server.http.conftest import LIMIT, Served
 
 NOD = '<bml id="a"><head id="n" lexeme="NOD"/></bml>'
@@ -111,22 +110,6 @@ def test_app_checks_documents(app) -> None:
     assert json.loads(app("POST", "/check", NOD)[2]) == []
 
 
-def test_app_refuses_bad_names_and_other_origins(app) -> None:
-    assert app.error("POST", "/sessions/a%20b/bml", NOD)[0] == 400
-    assert app.error("GET", "/sessions/s/feedback?seen=x")[0] == 400
-    assert app.error("POST", "/check", NOD, Origin="http://evil.example")[0] == 403
-    assert app.error("POST", "/check", NOD, Host="evil.example")[0] == 403
-    assert app("PUT", "/check", NOD)[0] == 405
-
-
-def test_app_answers_a_wrong_method_in_words(app) -> None:
-    assert app.error("PUT", "/check", NOD) == (405, "wanted POST /check, got PUT")
-    for path in ("/", "/nothing", "/healthz"):
-        status, headers, body = app("POST", path, NOD)
-        assert (status, body) == (405, f"wanted GET or HEAD {path}, got POST\n".encode())
-        assert set(headers["allow"].split(", ")) == {"GET", "HEAD"}
-
-
 def test_app_says_where_there_is_a_websocket(app) -> None:
     status, headers, body = app("GET", "/ws?session=a")
     assert (status, headers["upgrade"]) == (426, "websocket")
@@ -155,13 +138,6 @@ def test_app_plays_documents_in_their_own_encoding(app) -> None:
     assert "\ufffd" not in next(data for data in feedback if "Feedback" in data)
 
 
-def test_app_says_in_words_that_it_has_a_fault(app, monkeypatch, caplog) -> None:
-    monkeypatch.setattr("realizer.server.http.app.document_of", None)
-    assert app.error("POST", "/realize", NOD) == (500, "an error of the service: its log says which")
-    assert "there is no answer to POST /realize" in caplog.text
-    assert b"realizer_http_failures_total 1" in app("GET", "/metrics")[2]
-
-
 def test_app_closes_a_websocket_that_fails(app, monkeypatch, caplog) -> None:
     monkeypatch.setattr("realizer.server.http.page_tools.lint", None)
     with connect(app.url.replace("http", "ws") + "/check", open_timeout=LIMIT) as socket:
@@ -169,17 +145,6 @@ def test_app_closes_a_websocket_that_fails(app, monkeypatch, caplog) -> None:
         with pytest.raises(ConnectionClosed, match=r"1011.*internal error"):
             socket.recv(LIMIT)
     assert "the WebSocket at /check failed" in caplog.text
-
-
-def test_app_says_when_to_try_again(app, monkeypatch) -> None:
-    for status, retry in ((503, True), (429, True), (503, False), (400, True)):
-
-        def refuse(*_: object, code: int = status, again: bool = retry, **__: object) -> None:
-            raise JoinError(code, "no", retry=again)
-
-        monkeypatch.setattr("realizer.server.http.app.document_of", refuse)
-        got, headers, _ = app("POST", "/realize", NOD)
-        assert (got, "retry-after" in headers) == (status, retry and status != 400)
 
 
 def test_app_limits_the_connections_of_an_address(open_service) -> None:
