@@ -30,6 +30,7 @@ from bml_schema.nodes import CORE, Block
 from bml_schema.parser import MAX_BEHAVIOURS, read_block
 from bml_schema.speech_rescue import rescue
 from bml_schema.ssml import document_of, start_of_speak
+from bml_schema.text_repair import repaired
 from bml_schema.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
@@ -373,24 +374,34 @@ def _block(text: str, span: DocumentSpan, line: int, reader: _Reader, max_bytes:
     notes, reader.notes = reader.notes, ()
     try:
         root = element(data, lines_before=line - 1, block=id)
-    except BMLSyntaxError:
-        mended, note = ("", "") if reader.strict_bml else mend(document)
-        if note:
-            data, notes = mended.encode(), (*notes, note)
-        found = None if reader.strict_bml else read_undeclared(data, reader.vocabulary)
+    except BMLSyntaxError as error:
+        found = None if reader.strict_bml else _repaired(document, reader, error)
         if found is None:
             raise
-        root, note = found
-        notes = (*notes, note) if note else notes
+        root, data, more = found
+        notes = (*notes, *more)
     return reader.read(root, _begins(data), lines_before=line - 1, notes=notes)
 
 
-# "&" and "<" that begin no markup.
-_BARE = re.compile(rb"&(?!#?\w+;)|<(?![A-Za-z_:/!?\x80-\xff])")
+def _repaired(
+    document: str, reader: _Reader, error: BMLSyntaxError
+) -> tuple[etree._Element, bytes, tuple[str, ...]] | None:
+    """Return the root of a document that is not well-formed, its text and notes; None if it has no words.
 
-
-def _escaped(bare: re.Match[bytes]) -> bytes:
-    return b"&amp;" if bare[0] == b"&" else b"&lt;"
+    Its words are read in any case, and of the rest what can be read.
+    """
+    notes: tuple[str, ...] = ()
+    for repair in (repaired, mend):
+        document, note = repair(document)
+        found = read_undeclared(document.encode(), reader.vocabulary)
+        notes = (*notes, note) if note else notes
+        if found is not None:
+            return found[0], document.encode(), (*notes, found[1]) if found[1] else notes
+    root: Any = etree.fromstring(document.encode(), xml_parser(recover=True))
+    texts = [] if root is None or local(str(root.tag)) != "bml" else root.iter("{*}text", "{*}speak")
+    if not any("".join(text.itertext()).strip() for text in texts):
+        return None
+    return root, document.encode(), (*notes, f"{error.text}: what can be read of it plays")
 
 
 def _spoken(text: str, lines_before: int, reader: _Reader, max_bytes: int) -> Block:
@@ -402,7 +413,7 @@ def _spoken(text: str, lines_before: int, reader: _Reader, max_bytes: int) -> Bl
     try:
         root = element(data, lines_before=lines_before)
     except BMLSyntaxError as error:
-        root = etree.fromstring(_BARE.sub(_escaped, data), xml_parser(recover=True))
+        root = etree.fromstring(mend(repaired(text)[0])[0].encode(), xml_parser(recover=True))
         notes = (f"{error.text} in <speak>: what can be read of it is spoken",)
     document = document_of(root, next(reader.block_ids))
     return reader.read(document, {}, lines_before=lines_before, notes=notes)

@@ -261,7 +261,15 @@ class ElementReader:
         if values["type"] == SSML:
             speak = [c for c in element if local(str(c.tag)) == "speak"]
             if len(speak) != 1:
-                raise Fault(f"wanted one <speak> for {SSML}, got {len(speak) or 'none'}", element)
+                fault = f"wanted one <speak> for {SSML}, got {len(speak) or 'none'}"
+                around = element.getparent()
+                is_speech = around is not None and self.tag(around) == Speech.tag
+                is_alone = is_speech and around is not None and around.find("{*}text") is None
+                if not (self.lenient and is_alone and "".join(map(str, element.itertext())).strip()):
+                    raise Fault(fault, element)
+                said = f"{fault}: all text of the description is spoken"
+                self.remarks.append(Fault(said, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED))
+                return Description(**values, content=described(element).content)
             if (language := element.get(LANGUAGE)) and LANGUAGE not in speak[0].attrib:
                 speak[0].set(LANGUAGE, language)  # it is outside of the content
             return Description(**values, content=canonical(speak[0]))

@@ -24,6 +24,7 @@ ELEMENTS = APART | {"emphasis", "lang", "phoneme", "prosody", "say-as", "sub", "
 _LOCAL = (core(""), *(f"{{{space}}}" for space in DRAFTS))
 
 
+_NAME = re.compile(r"[^\W\d][\w.-]*")
 _PROLOG = re.compile(
     r"(?:[\s\ufeff]|<\?[^<>]*\?>|<!--.*?-->|<!DOCTYPE[^<>\[]*>)*+(?=<(?:[\w.-]+:)?speak[\s/>])", re.DOTALL
 )
@@ -76,6 +77,8 @@ def described(text: etree._Element) -> Description:
             tag = "mark" if is_new else "w"  # which says nothing
             if is_new:
                 element.set("name", mark)
+        elif not _NAME.fullmatch(tag):  # such as ":x", which has no namespace
+            tag = "w"
         if str(element.tag).startswith(_LOCAL) or not str(element.tag).startswith("{"):
             element.tag = f"{{{SPACE}}}{tag}"
     speak.tag = f"{{{SPACE}}}speak"

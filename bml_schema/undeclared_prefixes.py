@@ -17,6 +17,11 @@ _MEANT = NAMESPACES | {"sbm": SMARTBODY, "greta": GRETA}
 _INNER = {local(tag) for tag in INNER}
 
 
+def _is_spoken(element: etree._Element) -> bool:
+    """Return whether an element is inside of what is spoken."""
+    return any(local(str(around.tag)) in ("text", "speak") for around in element.iterancestors())
+
+
 def read_undeclared(
     data: bytes, vocabulary: Mapping[str, type[Behaviour]]
 ) -> tuple[etree._Element, str] | None:
@@ -50,7 +55,9 @@ def read_undeclared(
             if tag is None and (prefix in _MEANT or element is root):
                 tag = f"{{{_MEANT[prefix]}}}{name}" if prefix in _MEANT else name
             if tag is None and (
-                name in _INNER or any(name in schema_of(c).by_local for c in vocabulary.values())
+                _is_spoken(element)  # SSML, or unknown: its words are spoken
+                or name in _INNER
+                or any(name in schema_of(c).by_local for c in vocabulary.values())
             ):
                 tag = name
             if tag is None and local(element.getparent().tag) in ("bml", "required"):

@@ -45,7 +45,6 @@ def test_note_quotes_the_words_around_a_sign() -> None:
     [
         '<bml id="b"><head id="h" lexeme=NOD/></bml>',
         '<bml id="b"><head id="h" < lexeme="NOD"/></bml>',
-        '<bml id="b"><speech id="s"><text>5 < 6</speech></bml>',
     ],
 )
 def test_other_faults_are_refused_as_before(document: str) -> None:

@@ -24,7 +24,7 @@ def test_undeclared_prefix_of_an_attribute_costs_one_warning() -> None:
         ('<ext:faceFacs id="f" au="4"/>', '<faceFacs id="f" au="4"/>'),
         (
             '<speech id="s"><q:text>a <q:sync id="m"/>b <q:b>c</q:b> d</q:text></speech>',
-            '<speech id="s"><text>a <sync id="m"/>b  d</text></speech>',
+            '<speech id="s"><text>a <sync id="m"/>b <b>c</b> d</text></speech>',
         ),
         ('<q:wink id="w"/><head id="h" lexeme="NOD"/>', '<head id="h" lexeme="NOD"/>'),
         ('<head id="h" lexeme="NOD" q:lexeme="SHAKE"/>', '<head id="h" lexeme="NOD"/>'),
