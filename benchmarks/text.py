@@ -1,6 +1,6 @@
 """Measures the text layer: `python benchmarks/text.py` prints processor time per 1,000 characters.
 
-The limit of 1 ms is meant for a machine on which nothing else runs: compare the rows with that of prose.
+The limit of 1 ms is meant for a machine on which nothing else runs.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ LIMIT = 1.0  # ms per 1,000 characters
 TEXTS = {
     "prose": "This is a simple text without a link, and with more words for you to read aloud. ",
     "numbers": "It costs $12.50 on May 5, 2024, which is 20% less than the 15.60 that others ask here. ",
-    "answer": "**Sure!** Here is what *I* would do:\n\n1. Open [the page](https://example.org/a/b) and log in.\n"
+    "answer": "**Sure!** Here is what *I* would do:\n\n1. Open [the page](https://x.org/a/b) and log in.\n"
     "2. Choose `Settings`, then wait about five minutes until everything is there.\n\nThat is all 😀. ",
     "emphasis": "**Sure!** Here is what *I* would do, and it is not much: open [the page](https://x.org). ",
 }

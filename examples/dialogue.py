@@ -11,10 +11,10 @@ and the model gets the line and the part of its own text that was heard. An empt
 "go on" makes it speak the rest. The end of input (Ctrl-D) ends the dialogue.
 
 This file is a tutorial; read it from top to bottom. A model is a function that takes the history (the
-messages of a chat) and yields tokens. Its text may contain marks: lexemes of the service such as [nod],
-[shake] and [smile], and emotions such as [joy], become behaviours that start at this place; [pause] is half
-a second of silence. Every word and every mark is also a sync point, so the service reports when it is
-spoken. When a speech is interrupted, the service reports which words were heard.
+messages of a chat) and yields tokens. Its text may contain Markdown and marks, which the service reads:
+lexemes such as [nod], [shake] and [smile], and emotions such as [joy], become behaviours that start at
+this place; [pause] is half a second of silence. Every word and every mark is also a sync point, so the
+service reports when it is spoken. When a speech is interrupted, the service reports which words were heard.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ import urllib.error
 import urllib.request
 from collections.abc import AsyncIterator, Callable, Iterable, Iterator
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from bml_schema.feedback import BlockProgress, SyncPointProgress
 from realizer.client import Client, ClientError, connect
@@ -50,7 +49,7 @@ SCRIPT = {  # what the user says -> what the model says
     r"\b(story|tell)\b": """[joy] With pleasure. Once there was a face that could not stop. [sadness] When
         somebody called "wait", [shake] it talked on to the end of its text. [pause] Then it learned
         [raise_brows] to listen: every word it said left a trace, [nod] and when it was interrupted, it knew
-        which one had been the last. [moral] So it said nothing twice, [smile] and was good company.""",
+        which one had been the last. [pause] So it said nothing twice, [smile] and was good company.""",
     r"\b(hello|hi|hey)\b": "[smile] Hello! [nod] Ask me for a story, and interrupt me while I tell it.",
     r"\b(bye|thanks?)\b": "[joy] It was a pleasure. [nod] Goodbye!",
     r"": '[raise_brows] I only know a story. Say "tell me", or "go on" where you stopped me.',
@@ -152,22 +151,13 @@ class Turn:
         yield rest
 
     def marked(self, word: str) -> str:
-        """Return a word and its marks as BML: with sync points, and with < and & escaped."""
-        capabilities, parts = self.client.welcome["capabilities"], []
+        """Return a word and its marks with a sync point before each; the service reads the marks."""
+        parts = []
         for part in re.split(r"(\[[\w-]+\])", word):
             if part.strip():
                 parts.append(f'<sync id="s{len(self.syncs)}"/>')
                 self.syncs.append(part.strip())
-            mark = part[1:-1] if re.fullmatch(r"\[[\w-]+\]", part) else None
-            if mark is None:
-                parts.append(escape(part))
-            elif mark == "pause":
-                parts.append('<break time="500ms"/>')
-            elif mark in capabilities["emotions"]:
-                parts.append(f'<realizer:emotion name="{mark}"/>')
-            else:
-                kinds = [kind for kind, lexemes in capabilities["lexemes"].items() if mark.upper() in lexemes]
-                parts += [f'<{kind} lexeme="{mark.upper()}"/>' for kind in kinds[:1]]
+            parts.append(part)
         return "".join(parts)
 
     async def speak(self) -> None:

@@ -8,21 +8,21 @@ from pathlib import Path
 from typing import Self
 
 from bml_schema import Block, BMLError, Speech, read, write
-from bml_schema.escape import ILLEGAL
+from bml_schema.escape import ILLEGAL, escape
 from realizer.behaviours.registry import VOCABULARY
 from realizer.core.options import PlayOptions
 from realizer.knowledge.enrich import Enricher, SpokenText
 from realizer.knowledge.word_languages import Words, language_of
 from realizer.playback.player import Player
 from realizer.playback.speaking import submit_with_speech
-from realizer.sources import is_file_name
+from realizer.sources import is_file_name, is_markup, spoken
 from realizer.speech.silent import SilentVoice
 from realizer.speech.utterance import MAX_TEXT
 from realizer.tables.emotional_words import words_of
 from realizer.tables.knowledge import Role, knowledge
+from realizer.text.spoken import spoken_text
 
 ROLES = ("speaker", "listener")
-MARKUP = re.compile(r"\s*<(?!\d)[\w:?!/]")  # but not "<3"
 MARKED = re.compile(rb"(?:\xef\xbb\xbf)?\s*<(?![\d\s])|\xff\xfe|\xfe\xff")
 
 log = logging.getLogger(__name__)
@@ -35,6 +35,7 @@ def enrich(
     mood: str | None = None,
     language: str | None = None,
     words: Path | str | None = None,
+    plain: bool = False,
 ) -> str:
     """Return BML that speaks a text with expressions, or documents with further expressions.
 
@@ -45,6 +46,7 @@ def enrich(
         role: "speaker", or "listener" for the expressions of one who listens to the text.
         mood: a word such as "happy": how often expressions come and how long they last.
         language: BCP-47 tag of text without xml:lang; None: en-US.
+        plain: whether a text is spoken sign by sign, without Markdown, stage directions and the like.
         words: a file of emotional words, in the format of realizer/tables/emotional_words_en.csv.
 
     Raises:
@@ -69,7 +71,7 @@ def enrich(
         raise ValueError(error.args[0]) from None
     own = None if words is None else words_of(Path(words))
     enricher = Enricher(role, feeling, Words(language or "en-US", own, everywhere=language is None))
-    enriched = Enrichment.of(content, enricher, log.warning)
+    enriched = Enrichment.of(content, enricher, log.warning, plain=plain)
     if not enriched.blocks:
         raise enriched.errors[0]
     return enriched.bml
@@ -98,8 +100,13 @@ class Enrichment:
         return "".join(write(block) for block in self.blocks)
 
     @classmethod
-    def of(cls, source: str | bytes, enricher: Enricher, report: Callable[[str], None]) -> Self:
+    def of(
+        cls, source: str | bytes, enricher: Enricher, report: Callable[[str], None], *, plain: bool = False
+    ) -> Self:
         """Enrich a text or documents, and report what is left out.
+
+        Args:
+            plain: whether a text is spoken sign by sign.
 
         Raises:
             ValueError: there is no text.
@@ -107,7 +114,7 @@ class Enrichment:
         found = cls()
         if not source.strip():
             raise ValueError("wanted a text or a BML document, got only blanks")
-        if isinstance(source, bytes) or MARKUP.match(source):
+        if isinstance(source, bytes) or is_markup(source):
             found._add_documents(source, enricher, report)
             return found
         clean, count = ILLEGAL.subn(" ", source)
@@ -115,6 +122,14 @@ class Enrichment:
             report(f"{count} character{'s' * (count > 1)} that XML cannot hold became blanks")
         if not clean.strip():
             raise ValueError("wanted a text or a BML document, got characters XML cannot hold")
+        if not plain:
+            said = spoken_text(clean, enricher.words.language)
+            for warning in said.warnings:
+                report(warning)
+            if said.markup != escape(said):  # behaviours, or SSML
+                found._add_documents(spoken(clean, language=enricher.words.language), enricher, report)
+                return found
+            clean = said.text
         found.blocks += enricher.texts(clean, MAX_TEXT)
         found.placed = sum(map(_count_placed, found.blocks))
         found.languages = [enricher.words.language]

@@ -102,8 +102,13 @@ def rules_for(folder: Path | None) -> tuple[Knowledge, Mapping[str, Template] | 
     options.FOLDER,
     is_eager=True,
 )
+@option(
+    "--plain", "Speak a TEXT sign by sign, without Markdown, stage directions and the like.", is_flag=True
+)
 @option("-o --output OUT.bml", "File to write.  [default: print it]", options.OUTPUT)
-def enrich(text: str, language: str | None, words: Path | None, output: Path | None, **who: Any) -> int:
+def enrich(
+    text: str, language: str | None, words: Path | None, plain: bool, output: Path | None, **who: Any
+) -> int:
     """Add facial expressions to a text or a BML document (Wojdel 2005, 6.5).
 
     A text becomes a BML document that speaks it, with expressions at words and sentence ends; in a document,
@@ -121,7 +126,7 @@ def enrich(text: str, language: str | None, words: Path | None, output: Path | N
     lists = words_for(language, words)
     with inputs.reporting(ValueError):
         enricher = Enricher(who["role"], who["mood"], lists, *rules_for(who["knowledge"]))
-        enriched = Enrichment.of(source, enricher, partial(click.echo, err=True))
+        enriched = Enrichment.of(source, enricher, partial(click.echo, err=True), plain=plain)
     if not is_quiet():
         warn_unknown_languages(lists, enriched.languages, set())
     if language is None and words is None and _is_foreign(source, lists.language):

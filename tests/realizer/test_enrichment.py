@@ -50,3 +50,12 @@ def test_enrich_refuses_what_is_no_text() -> None:
         realizer.enrich("  ")
     with pytest.raises(BMLError, match="line 1"):
         realizer.enrich("<bml/>")
+
+
+def test_enrich_reads_a_text_as_people_mean_it() -> None:
+    text = realizer.enrich("**Great**, it costs $5!")
+    assert "Great" in text
+    assert "five dollars" in text
+    assert "*" not in text
+    assert 'lexeme="NOD"' in realizer.enrich("Great [nod] news!")
+    assert "**" in realizer.enrich("**Great** news!", plain=True)

@@ -12,6 +12,7 @@ from realizer.server.session.control_fields import FieldError
 from realizer.server.speech.clip import ArrivingClip, Clip, samples_of
 from realizer.speech.recorded.recorded_speech import sound_of
 from realizer.speech.utterance import RATES, Phoneme, Recording, Word
+from realizer.text.spoken import spoken_text
 
 MAX_BYTES = 64 * 2**20  # of all clips of a session: half an hour of speech; the oldest are removed
 MAX_CLIPS = 1000  # of a session
@@ -184,7 +185,11 @@ class AudioClips:
         self._changed.add(message.clip)
         clip.words, clip.phonemes = [*old.words, *message.words], [*old.phonemes, *phonemes]
         clip.is_annotated = message.final
-        clip.text = old.text if message.text is None else message.text
+        clip.text = old.text
+        if message.text is not None:
+            clip.text = (
+                message.text if message.plain else str(spoken_text(message.text, message.language or "en"))
+            )
         self._clips[message.clip] = clip
         self._publish(message.clip, clip)
         self._make_room(message.clip)
