@@ -49,6 +49,7 @@ ADDRESS = re.compile(
 )
 DEFINITION = re.compile(r"\[[^\]\n]+\]:\s*<?(?:[a-z]+:|www\.|/|#|\.)", re.IGNORECASE)
 BEGUN_LABEL = re.compile(r"\[[^\]\n]{0,200}(?:\]:?)?$")
+REFERENCE = re.compile(r"\[([^\[\]]+)\]\[[^\[\]]*\]")  # a link whose address is elsewhere
 CITATION = re.compile(r"\^[^\]]*|[0-9]+(?:\s*[,–-]\s*[0-9]+)*")
 BRACKETS = re.compile(r"\[([^\[\]]{1,60})\]|\(([^()]{1,60})\)")
 # Signs that no one says: what is left of markup, arrows, and a hash before a word.
@@ -278,7 +279,7 @@ class TextStream:
         """Return words without what no one says, and the behaviours of marks among them."""
         if PLAIN.fullmatch(text) and "_" not in text and ":" not in text and ";" not in text:
             return (text,)
-        text = ADDRESS.sub(r"\1", text)
+        text = REFERENCE.sub(r"\1", ADDRESS.sub(r"\1", text))
         parts: list[Part] = []
         at = 0
         for found in BRACKETS.finditer(text):

@@ -22,6 +22,7 @@ const DEFINITION = /\[[^\]\n]+\]:\s*<?(?:[a-z]+:|www\.|\/|#|\.)/iy;
 const ENDED = /[.!?…:;,。！？、，；：۔؟।]["'”’»)\]]*\s*$/;
 const ADDRESS =
   /(?:https?:\/\/(?:[^\s/@<>]*@)?(?:www\.)?|(?<![\p{L}\p{N}_])www\.)([^\s/?#:<>"'`()[\]*_]*[\p{L}\p{N}_])(?:[:/?#][^\s<>"'`]*[^\s<>"'`.,;:!?)\]*_])?/giu;
+const REFERENCE = /\[([^[\]]+)\]\[[^[\]]*\]/g; // a link whose address is elsewhere
 const CITATION = /^(?:\^[^\]]*|[0-9]+(?:\s*[,–-]\s*[0-9]+)*)$/;
 const BRACKETS = /\[([^[\]]{1,60})\]|\(([^()]{1,60})\)/g;
 const UNSAID = /(?<!\S)\|(?!\S)|[→⇒➜]|(?<!\S)(?:-{1,2}|=)>(?!\S)|#(?=\p{L})|\\/gu;
@@ -192,7 +193,7 @@ class Reader {
   }
 
   #words(text) {
-    text = text.replace(ADDRESS, "$1");
+    text = text.replace(ADDRESS, "$1").replace(REFERENCE, "$1");
     const parts = [];
     let at = 0;
     for (const found of text.matchAll(BRACKETS)) {

@@ -18,6 +18,7 @@ MARKDOWN = [
     ("> quoted\n> words", "quoted words"),
     ("See [our page](https://x.org/a?b).", "See our page."),
     ("See <https://x.org>.", "See x.org."),
+    ("See [our page][page].", "See our page."),
     ("See https://www.example.org/a/b?c=d#e, now", "See example.org, now"),
     ("![a cat](cat.png) sits", "a cat sits"),
     ("Call `main` now", "Call main now"),
