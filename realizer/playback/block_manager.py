@@ -15,8 +15,8 @@ from realizer.playback.announced_blocks import (
     BlockLinks,
     BlockRejectedError,
 )
-from realizer.playback.anticipation import anticipators_of, lead_times
 from realizer.playback.block_commands import CommandError, execute
+from realizer.playback.block_links import lead_times
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent, State, next_state
 from realizer.playback.character import Cast
@@ -29,6 +29,7 @@ from realizer.playback.feedback_events import (
     sync_progress,
 )
 from realizer.playback.joint_planner import Arrival
+from realizer.playback.references import anticipators_of
 from realizer.playback.timeline import BlockTimeline
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance

@@ -8,13 +8,12 @@ import numpy as np
 
 from realizer.core import work
 from realizer.playback.active_block import ActiveBlock
+from realizer.playback.references import ANTICIPATORS
 from realizer.scheduling.timing import Schedule
 
 # Maximum number of schedules of ended blocks, which references may name.
 PAST = 50  # 2 kB each
 PAST_POINTS = 50_000  # in all of them; the last schedule is kept in any case
-# BMLA's reserved block id for points in time that a client announces.
-ANTICIPATORS = "anticipators"
 
 
 class BlockStore:

@@ -1,4 +1,4 @@
-"""What a block names in other blocks: sync references, and the speech that it continues."""
+"""What a block names in other blocks: sync references, anticipators, and speech that it continues."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field, fields, replace
@@ -54,3 +54,11 @@ def with_references(block: Block, to: Callable[[SyncRef], SyncRef]) -> Block:
         return replace(node, syncs={point: to(ref) for point, ref in node.syncs.items()})
 
     return block.with_children(inside)
+
+
+# BMLA's reserved block id for points in time that a client announces.
+ANTICIPATORS = "anticipators"
+
+
+def anticipators_of(block: Block) -> set[str]:
+    return {ref.behaviour or "" for ref in references(block) if ref.block == ANTICIPATORS}

@@ -1,6 +1,8 @@
 """The espeak-ng voice; its engine runs in a process of its own."""
 
 import importlib.util
+import unicodedata
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache, partial
@@ -13,7 +15,6 @@ from realizer.core.similar import did_you_mean, similar
 from realizer.speech.engine_voice import Engine, EngineVoice
 from realizer.speech.espeak.document import write_document
 from realizer.speech.espeak.events import read_answer, timeline
-from realizer.speech.scripts import LANGUAGES, foreign_script
 from realizer.speech.ssml import Script
 from realizer.speech.utterance import SpeechRequest, Utterance
 
@@ -25,6 +26,37 @@ READ_BY_ALL = frozenset({
     "BENGALI", "DEVANAGARI", "GEORGIAN", "GUJARATI", "GURMUKHI", "HANGUL", "KANNADA", "MALAYALAM", "SINHALA",
     "TAMIL",
 })  # fmt: skip
+# The first word of the Unicode names of a script's letters -> the primary subtags of espeak-ng's languages
+# that are written in it, the most spoken first.
+LANGUAGES: Mapping[str, tuple[str, ...]] = {
+    script: tuple(languages.split())
+    for script, languages in {
+        "CYRILLIC": "ru uk bg sr be kk ky tt ba cv mk",
+        "GREEK": "el grc",
+        "CJK": "zh cmn yue hak ja",
+        "HIRAGANA": "ja",
+        "KATAKANA": "ja",
+        "HANGUL": "ko",
+        "ARABIC": "ar fa ur sd ug ku",
+        "HEBREW": "he",
+        "DEVANAGARI": "hi mr ne kok",
+        "BENGALI": "bn as bpy",
+        "GURMUKHI": "pa",
+        "GUJARATI": "gu",
+        "ORIYA": "or",
+        "TAMIL": "ta",
+        "TELUGU": "te",
+        "KANNADA": "kn",
+        "MALAYALAM": "ml",
+        "SINHALA": "si",
+        "THAI": "th",
+        "MYANMAR": "my shn",
+        "GEORGIAN": "ka",
+        "ARMENIAN": "hy hyw",
+        "ETHIOPIC": "am",
+        "CHEROKEE": "chr",
+    }.items()
+}
 INSTALL = "espeak-ng is not installed: pip install 'bml-realizer[speech]' (or apt-get install libespeak-ng1)"
 
 
@@ -143,3 +175,15 @@ def _by_name(hello: dict[str, Any], name: str) -> str | None:
         if name.lower() in (voice["id"].lower(), voice["name"].lower()):
             return str(voice["id"])
     return None
+
+
+def foreign_script(text: str, language: str) -> str | None:
+    """Return the script of most letters of a text, if the language is not written in it; else None.
+
+    Args:
+        language: a tag, of which the primary subtag counts.
+    """
+    scripts = Counter(unicodedata.name(c, "").partition(" ")[0] for c in text if c.isalpha())
+    script, count = next(iter(scripts.most_common(1)), ("", 0))
+    is_foreign = language.lower().partition("-")[0] not in LANGUAGES.get(script, ())
+    return script if script in LANGUAGES and is_foreign and 2 * count > scripts.total() else None

@@ -22,6 +22,7 @@ from realizer.playback.block_links import (
     dependencies,
     existing_claims,
     followers,
+    lead_times,
     with_stops,
 )
 from realizer.playback.block_planner import plan
@@ -433,3 +434,51 @@ def test_replanning_for_a_failed_block_moves_nothing(stage: Stage) -> None:
     refused = stage.send("b", '<required><wait id="w" start="a:f:end" end="0"/></required>', at=0.1)
     assert refused.failed
     assert stage.player.latest(first).end == first.end
+
+
+WAIT = '<bml id="a"><wait id="w" start="0" end="anticipators:clock:beat"/></bml>'
+
+
+def anticipating(text: str) -> ActiveBlock:
+    """Return a block that plays from 0 s on; unknown points are at 9 s."""
+    block = parse(text)
+    planned = plan(block, KINDS, PlanningContext(), external_times=lambda ref: 9.0 + ref.offset)
+    made = ActiveBlock(planned, KINDS, PlanningContext(), 0, 1, 0.0)
+    made.apply_plan(planned, 0.0, 0.0)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("body", "least"),
+    [
+        ("", 0.0),
+        ('<faceLexeme id="f" lexeme="SMILE" start="0" end="a:w:end"/>', 0.04),
+        ('<faceLexeme id="f" lexeme="SMILE" start="0" end="a:w:end-0.5"/>', 0.54),
+        ('<faceLexeme id="f" lexeme="SMILE" start="0" relax="a:w:end"/>', 0.0),
+        (
+            '<faceLexeme id="f" lexeme="SMILE" start="0" end="n:end"/>'
+            '<head id="n" lexeme="NOD" end="a:w:end"/>',
+            0.12,
+        ),
+        (
+            '<faceLexeme id="f" lexeme="SMILE" start="0"/><constraint id="c"><synchronize ref="a:w:end">'
+            '<sync ref="f:end+0.1"/></synchronize></constraint>',
+            0.14,
+        ),
+    ],
+)
+def test_lead_times_is_the_least_time_of_what_is_tied_to_a_point(body: str, least: float) -> None:
+    group = [anticipating(WAIT), anticipating(f'<bml id="b">{body}</bml>')]
+    found = lead_times(group, "clock", ("beat", "other"), 4.0)
+    assert found["beat"] == pytest.approx(4.0 + least, abs=0.021)
+    assert found["other"] == 4.0
+
+
+def test_lead_times_keeps_the_least_gap_behind_a_point_that_has_passed() -> None:
+    group = [
+        anticipating(WAIT),
+        anticipating('<bml id="b"><faceLexeme id="f" lexeme="SMILE" start="0" end="a:w:end"/></bml>'),
+    ]
+    relax = group[1].schedule.at("f", "relax")
+    assert lead_times(group, "clock", ["beat"], relax + 0.01)["beat"] == pytest.approx(relax + 0.04)
+    assert lead_times(group, "clock", ["beat"], 9.0)["beat"] == 9.0, "all has passed"

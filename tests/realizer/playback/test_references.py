@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from bml_schema import parse
-from realizer.playback.references import external_refs, references, with_references
+from realizer.playback.references import anticipators_of, external_refs, references, with_references
 
 
 def test_references_of_attributes_texts_and_constraints_are_found() -> None:
@@ -33,3 +33,8 @@ def test_with_references_replaces_every_reference() -> None:
     assert with_references(block, lambda ref: ref) == block
     later = with_references(block, lambda ref: replace(ref, offset=ref.offset + 1))
     assert sorted(ref.offset for ref in references(later)) == [1, 1, 1, 2, 3, 4, 5]
+
+
+def test_anticipators_are_those_that_behaviours_refer_to() -> None:
+    tied = '<bml id="a"><wait id="w" start="0" end="anticipators:clock:beat"/></bml>'
+    assert anticipators_of(parse(tied)) == {"clock"}

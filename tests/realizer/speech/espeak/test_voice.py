@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import VoiceError
-from realizer.speech.espeak.voice import EspeakVoice, choose_voice
+from realizer.speech.espeak.voice import EspeakVoice, choose_voice, foreign_script
 from realizer.speech.utterance import SpeechRequest, Utterance
 
 pytestmark = pytest.mark.espeak
@@ -334,3 +334,22 @@ def test_espeak_says_no_sign_that_a_person_would_not(voice: EspeakVoice, text: s
 def test_espeak_warns_of_scripts_that_it_spells_only(voice: EspeakVoice) -> None:
     assert not voice.say(SpeechRequest("안녕하세요")).warnings
     assert "such as 'th'" in voice.say(SpeechRequest("สวัสดีครับ")).warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("text", "language", "script"),
+    [
+        ("Hello there.", "en-US", None),
+        ("你好,很高兴见到你。", "en-US", "CJK"),
+        ("你好,很高兴见到你。", "cmn", None),
+        ("Привет, как дела?", "en-GB", "CYRILLIC"),
+        ("Привет, как дела?", "ru-RU", None),
+        ("これはペンです", "cmn", "HIRAGANA"),
+        ("The area is π times the square.", "en", None),
+        ("Hello there.", "ru", None),
+        ("12 + 3", "en", None),
+        ("", "en", None),
+    ],
+)
+def test_foreign_script_is_that_of_most_letters(text: str, language: str, script: str | None) -> None:
+    assert foreign_script(text, language) == script
