@@ -34,8 +34,8 @@ os.environ.update({"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"})
 
 from stopwatch import Noise
 
+from realizer.speech.espeak.espeak_worker import load
 from realizer.speech.espeak.voice import WORDS_A_MINUTE
-from realizer.speech.espeak.worker import load
 from realizer_studio.batch.process_pool import ProcessPool
 from realizer_studio.batch.task import Options, Task
 from realizer_studio.batch.worker import Worker

@@ -8,7 +8,7 @@ from realizer.animation.channel import Gain
 from realizer.behaviours.kind import BehaviourKind, BlockCommand
 from realizer.core.similar import did_you_mean, similar
 from realizer.playback.active_block import ActiveBlock
-from realizer.playback.timeline import BlockTimeline
+from realizer.playback.block_timeline import BlockTimeline
 
 # Duration of an instant change of a face and of a sound, which avoids jumps and clicks.
 AT_ONCE = {False: 0.1, True: 0.02}  # s

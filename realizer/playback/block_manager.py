@@ -19,6 +19,7 @@ from realizer.playback.block_commands import CommandError, execute
 from realizer.playback.block_links import lead_times
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent, State, next_state
+from realizer.playback.block_timeline import BlockTimeline
 from realizer.playback.character import Cast
 from realizer.playback.feedback_events import (
     Event,
@@ -30,7 +31,6 @@ from realizer.playback.feedback_events import (
 )
 from realizer.playback.joint_planner import Arrival
 from realizer.playback.references import anticipators_of
-from realizer.playback.timeline import BlockTimeline
 from realizer.scheduling.timing import UNKNOWN, Schedule, Warning
 from realizer.speech.utterance import Utterance
 

@@ -69,7 +69,7 @@ def install_hint() -> str | None:
     return None if ctypes.util.find_library("espeak-ng") else INSTALL
 
 
-ENGINE = Engine("espeak-ng", Path(__file__).with_name("worker.py"), install_hint)
+ENGINE = Engine("espeak-ng", Path(__file__).with_name("espeak_worker.py"), install_hint)
 
 
 class EspeakVoice(EngineVoice):

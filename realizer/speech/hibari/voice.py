@@ -107,7 +107,7 @@ def voice_hint(name: str) -> str | None:
     return None
 
 
-ENGINE = Engine("hibari", Path(__file__).with_name("worker.py"), install_hint)
+ENGINE = Engine("hibari", Path(__file__).with_name("hibari_worker.py"), install_hint)
 
 
 class HibariVoice(EngineVoice):

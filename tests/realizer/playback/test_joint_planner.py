@@ -10,8 +10,8 @@ from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock
 from realizer.playback.block_planner import Plan
 from realizer.playback.block_states import BlockEvent
+from realizer.playback.block_timeline import BlockTimeline
 from realizer.playback.joint_planner import Arrival
-from realizer.playback.timeline import BlockTimeline
 
 NOD = '<head id="n" lexeme="NOD" start="0" end="1"/>'
 GAZE = '<gaze id="g" target="camera" start="0" end="2"/>'

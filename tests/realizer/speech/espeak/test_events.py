@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from realizer.speech.espeak.document import Document
+from realizer.speech.espeak.espeak_worker import Event as Struct
 from realizer.speech.espeak.events import END, MARK, PHONEME, WORD, Event, read_answer, timeline
 from realizer.speech.espeak.voice import EspeakVoice
-from realizer.speech.espeak.worker import Event as Struct
 from realizer.speech.utterance import Phoneme, SpeechRequest, Utterance, Word
 from realizer.speech.words import PlacedMark
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from realizer.speech.hibari.worker import DURATIONS, LONGEST, split, with_output
+from realizer.speech.hibari.hibari_worker import DURATIONS, LONGEST, split, with_output
 
 
 def test_split_cuts_long_sentences_at_commas_or_else_at_blanks() -> None:

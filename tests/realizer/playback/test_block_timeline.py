@@ -12,9 +12,9 @@ from realizer.behaviours.kind import PlanningContext
 from realizer.behaviours.registry import KINDS
 from realizer.playback.active_block import ActiveBlock, Dependency
 from realizer.playback.block_states import BlockEvent, State
+from realizer.playback.block_timeline import BlockTimeline
 from realizer.playback.character import Character
 from realizer.playback.joint_planner import Arrival
-from realizer.playback.timeline import BlockTimeline
 
 
 def taken_in(
