@@ -33,7 +33,6 @@ from bml_schema.bmla import (
     Trajectory,
 )
 from bml_schema.documents import MAX_BYTES, MAX_DOCUMENTS, made_ids, parse, parse_all, read
-from bml_schema.dropped_references import ReducedBlock, without
 from bml_schema.errors import BMLError, BMLSizeError, BMLSyntaxError, Place, Problem
 from bml_schema.extensions import Blink, Emotion, Expression, Fap, FapFile, Faps, Idle, Listen, Mood, Timeline
 from bml_schema.feedback import (
@@ -63,7 +62,8 @@ from bml_schema.nodes import (
     Required,
     Synchronize,
 )
-from bml_schema.parser import MAX_BEHAVIOURS
+from bml_schema.reading.dropped_references import ReducedBlock, without
+from bml_schema.reading.parser import MAX_BEHAVIOURS
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import Value, flag, integer, number, one_of, seconds, string, word
 from bml_schema.vocabulary import VOCABULARY

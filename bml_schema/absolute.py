@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from bml_schema.behaviours import Speech, Wait
-from bml_schema.dropped_references import without
 from bml_schema.nodes import After, Before, Behaviour, Block, Constraint, Synchronize
+from bml_schema.reading.dropped_references import without
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import MAX_SECONDS
 

@@ -10,11 +10,14 @@ from typing import Any
 
 from lxml import etree
 
-from bml_schema.bare_signs import mend
 from bml_schema.canonical import xml_parser
 from bml_schema.dialects.intentions import FML_WRAPPER, fml_of
 from bml_schema.dialects.recognition import has_words_of_dialects, is_draft
-from bml_schema.document_splitter import (
+from bml_schema.errors import NOT_BML_1_0, BMLError, BMLSizeError, BMLSyntaxError, Fault
+from bml_schema.node_schema import local
+from bml_schema.nodes import CORE, Block
+from bml_schema.reading.bare_signs import mend
+from bml_schema.reading.document_splitter import (
     NEXT,
     WRAPPER_TAG,
     WRAPPERS,
@@ -22,16 +25,13 @@ from bml_schema.document_splitter import (
     document_spans,
     without_doctype,
 )
-from bml_schema.element_reader import ElementReader, Vocabulary
-from bml_schema.encodings import decode, is_declared, without_controls
-from bml_schema.errors import NOT_BML_1_0, BMLError, BMLSizeError, BMLSyntaxError, Fault
-from bml_schema.node_schema import local
-from bml_schema.nodes import CORE, Block
-from bml_schema.parser import MAX_BEHAVIOURS, read_block
-from bml_schema.speech_rescue import rescue
-from bml_schema.ssml import document_of, start_of_speak
-from bml_schema.text_repair import repaired
-from bml_schema.undeclared_prefixes import read_undeclared
+from bml_schema.reading.element_reader import ElementReader, Vocabulary
+from bml_schema.reading.encodings import decode, is_declared, without_controls
+from bml_schema.reading.parser import MAX_BEHAVIOURS, read_block
+from bml_schema.reading.speech_rescue import rescue
+from bml_schema.reading.ssml import document_of, start_of_speak
+from bml_schema.reading.text_repair import repaired
+from bml_schema.reading.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
 MAX_BYTES = 1 << 20  # of one document; an hour of speech with a nod on every word has a third of it

@@ -18,7 +18,7 @@ from bml_schema.errors import BMLError, BMLSyntaxError, quoted
 from bml_schema.escape import escape, sanitized, sanitized_value
 from bml_schema.node_schema import local, node
 from bml_schema.nodes import BMLA, CORE, OWN, Behaviour, bmla, core, own
-from bml_schema.parser import read_behaviour
+from bml_schema.reading.parser import read_behaviour
 from bml_schema.sync_refs import SyncRef
 from bml_schema.values import NUMBER, decimal
 from bml_schema.vocabulary import VOCABULARY

@@ -9,9 +9,9 @@ from bisect import bisect_right
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from bml_schema.encodings import decode
 from bml_schema.errors import BMLError
-from bml_schema.tolerant_scanner import DOCUMENT, Element, ScanError, scan
+from bml_schema.reading.encodings import decode
+from bml_schema.reading.tolerant_scanner import DOCUMENT, Element, ScanError, scan
 
 _STEP = re.compile(r"([^/\[\]]+)(?:\[([0-9]{1,9})\])?")
 

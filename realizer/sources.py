@@ -11,9 +11,9 @@ from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 from bml_schema import CORE, BMLError, Speech, read, write
-from bml_schema.element_reader import Vocabulary
-from bml_schema.encodings import decode, without_controls
 from bml_schema.nodes import BMLT
+from bml_schema.reading.element_reader import Vocabulary
+from bml_schema.reading.encodings import decode, without_controls
 from realizer.behaviours.speech import UNSAID
 from realizer.core.sound_formats import SUFFIXES as SOUNDS
 from realizer.core.sound_formats import format_of

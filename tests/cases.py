@@ -64,7 +64,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bml_schema import BlockProgress, Feedback, PredictionFeedback, SyncPointProgress, WarningFeedback
-from bml_schema.document_splitter import document_spans
+from bml_schema.reading.document_splitter import document_spans
 
 __all__ = ["CASES", "CORPUS", "Case", "Instant", "LogLine", "log_lines"]
 

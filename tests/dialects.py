@@ -15,7 +15,7 @@ from xml.sax.saxutils import quoteattr
 from bml_schema import Block, read, write
 from bml_schema.dialects.intentions import intentions
 from bml_schema.dialects.table import MISSING, Row, table
-from bml_schema.undeclared_prefixes import SMARTBODY
+from bml_schema.reading.undeclared_prefixes import SMARTBODY
 
 __all__ = ["FILE", "ROWS", "WRAPPERS", "cases", "published", "render", "sample"]
 

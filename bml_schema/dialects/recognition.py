@@ -9,8 +9,8 @@ from bml_schema.behaviours import Face, FaceShift
 from bml_schema.dialects.table import Row, table
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import DRAFTS, Behaviour, Block
+from bml_schema.reading.undeclared_prefixes import SMARTBODY
 from bml_schema.steps import next_element
-from bml_schema.undeclared_prefixes import SMARTBODY
 from bml_schema.vocabulary import VOCABULARY
 
 _SMARTBODY = f"{{{SMARTBODY}}}"

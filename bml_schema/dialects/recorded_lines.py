@@ -15,7 +15,7 @@ from bml_schema.canonical import canonical
 from bml_schema.dialects.table import Row
 from bml_schema.node_schema import local
 from bml_schema.nodes import BMLT, RECORDED, own
-from bml_schema.undeclared_prefixes import remove_element
+from bml_schema.reading.undeclared_prefixes import remove_element
 from bml_schema.values import NUMBER, decimal
 
 _SOUND = "audio"

@@ -9,7 +9,7 @@ from bml_schema.dialects.table import Row, table
 from bml_schema.dialects.values import language_tag
 from bml_schema.node_schema import local
 from bml_schema.nodes import LANGUAGE
-from bml_schema.ssml import ELEMENTS
+from bml_schema.reading.ssml import ELEMENTS
 
 _MARKS = {"sync": "id", "tm": "id", "mark": "name"}
 

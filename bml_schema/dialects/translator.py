@@ -16,7 +16,7 @@ from bml_schema.dialects.table import Report, Row, table
 from bml_schema.dialects.values import FUNCTIONS
 from bml_schema.node_schema import local
 from bml_schema.nodes import BMLA, BMLT, CORE, DRAFTS, NAMESPACES, OWN
-from bml_schema.undeclared_prefixes import SMARTBODY, remove_element
+from bml_schema.reading.undeclared_prefixes import SMARTBODY, remove_element
 
 _OURS = frozenset({BMLA, BMLT, OWN})
 _JOINTS = frozenset({"eyes", "head", "neck", "chest", "back"})  # SmartBody's children of <gaze>

@@ -21,8 +21,8 @@ from bml_schema import (
     SyncRef,
 )
 from bml_schema.node_schema import local, schema_of
+from bml_schema.reading.tolerant_scanner import Element
 from bml_schema.source import Source
-from bml_schema.tolerant_scanner import Element
 from realizer.behaviours.gaze_targets import is_known
 from realizer.checking.document import CheckedBlock
 from realizer.checking.explain import near

@@ -8,8 +8,8 @@ from typing import Any
 
 from bml_schema import Block
 from bml_schema.node_schema import Attribute, local, schema_of
+from bml_schema.reading.tolerant_scanner import Element
 from bml_schema.source import Source, Spot
-from bml_schema.tolerant_scanner import Element
 from realizer.checking.explain_conflicts import explain_conflict
 from realizer.checking.finding import Finding, FindingBuilder, Label
 from realizer.core.similar import similar

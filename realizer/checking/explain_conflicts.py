@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterable
 
+from bml_schema.reading.tolerant_scanner import Element
 from bml_schema.source import Spot
-from bml_schema.tolerant_scanner import Element
 from realizer.checking.finding import FindingBuilder, Label
 from realizer.scheduling.timing import Clause, Warning
 

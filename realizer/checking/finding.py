@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
+from bml_schema.reading.tolerant_scanner import Element
 from bml_schema.source import Source, Spot
-from bml_schema.tolerant_scanner import Element
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from bml_schema import Block, SyncRef, without
-from bml_schema.dropped_references import without_constraints, without_references
 from bml_schema.errors import listed
+from bml_schema.reading.dropped_references import without_constraints, without_references
 from realizer.animation.channel import Channel
 from realizer.behaviours.kind import BehaviourKind, PlanningContext
 from realizer.core import work

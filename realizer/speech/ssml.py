@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr, unescape
 
 from bml_schema.errors import did_you_mean
 from bml_schema.escape import ILLEGAL
-from bml_schema.ssml import APART, HIDDEN
+from bml_schema.reading.ssml import APART, HIDDEN
 from realizer.core.errors import VoiceError
 from realizer.speech.ssml_prosody import EMPHASIS, is_supported
 from realizer.speech.utterance import MAX_TEXT, SpeechRequest

@@ -23,7 +23,7 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from bml_schema import BMLError
-from bml_schema.encodings import decode
+from bml_schema.reading.encodings import decode
 from realizer.core.settings import Settings
 from realizer.outputs.registry import OUTPUTS
 from realizer.server.http.connections import SOCKETS, session_of

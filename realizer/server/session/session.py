@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bml_schema import BMLError, WarningFeedback
-from bml_schema.encodings import decode
+from bml_schema.reading.encodings import decode
 from realizer.behaviours.kind import Position
 from realizer.behaviours.registry import KINDS
 from realizer.core.errors import RealizerError

@@ -6,9 +6,9 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.canonical import MAX_ATTRIBUTES, xml_parser
-from bml_schema.element_reader import INNER
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import NAMESPACES, Behaviour, Block, bmla, bmlt, core, extension, own
+from bml_schema.reading.element_reader import INNER
 
 SMARTBODY = "http://ict.usc.edu"
 GRETA = "gretaNameSpace"

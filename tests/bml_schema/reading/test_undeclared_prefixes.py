@@ -3,7 +3,7 @@
 import pytest
 
 from bml_schema import BMLA, CORE, BMLSyntaxError, Head, Interrupt, parse, read
-from bml_schema.undeclared_prefixes import read_undeclared
+from bml_schema.reading.undeclared_prefixes import read_undeclared
 from bml_schema.vocabulary import VOCABULARY
 
 

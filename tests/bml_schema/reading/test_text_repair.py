@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, BMLError, Speech, parse, read
-from bml_schema.text_repair import repaired
+from bml_schema.reading.text_repair import repaired
 from tests.rows import each_row
 
 SPEECH = '<bml id="b"><speech id="s"><text>{}</text></speech><head id="h" lexeme="NOD"/></bml>'

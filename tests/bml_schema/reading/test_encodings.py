@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import Block, BMLError, Speech, read
-from bml_schema.encodings import decode, is_declared, without_controls
+from bml_schema.reading.encodings import decode, is_declared, without_controls
 
 TEXT = "café “naïve” – 5€"
 

@@ -35,9 +35,9 @@ from bml_schema.nodes import (
     core,
     extension,
 )
-from bml_schema.ssml import described, is_marked_up
+from bml_schema.reading.ssml import described, is_marked_up
+from bml_schema.reading.text_reader import read_mixed
 from bml_schema.sync_refs import Names, SyncRef, read_sync_ref, respelled
-from bml_schema.text_reader import read_mixed
 from bml_schema.values import NUMBER, describe_mismatch
 
 Vocabulary = Mapping[str, type[Behaviour]]

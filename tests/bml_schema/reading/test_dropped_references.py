@@ -17,7 +17,7 @@ from bml_schema import (
     without,
     write,
 )
-from bml_schema.dropped_references import ReferenceRemover, without_references
+from bml_schema.reading.dropped_references import ReferenceRemover, without_references
 from tests.strategies import blocks
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bml_schema.tolerant_scanner import scan
+from bml_schema.reading.tolerant_scanner import scan
 
 
 def test_scan_has_parents_numbers_and_places_of_values() -> None:

@@ -7,7 +7,7 @@ from lxml import etree
 
 from bml_schema.canonical import xml_parser
 from bml_schema.escape import escape, escape_value, sanitized
-from bml_schema.ssml import MARKS
+from bml_schema.reading.ssml import MARKS
 
 _STARTS = re.compile(r"<((?:[\w.-]+:)?(?:text|speak))(?=[\s>])[^<>]*(?<!/)>")
 _TAG = re.compile(r"<(/?)(?:[\w.-]+:)?([A-Za-z_][\w.-]*)([^<>]*)>")

@@ -3,8 +3,8 @@
 from lxml import etree
 
 from bml_schema import VOCABULARY, Head, Speech
-from bml_schema.block_outline import BlockOutline, flat
-from bml_schema.element_reader import ElementReader
+from bml_schema.reading.block_outline import BlockOutline, flat
+from bml_schema.reading.element_reader import ElementReader
 from bml_schema.sync_refs import Names
 
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import BMLError
-from bml_schema.document_splitter import document_spans
+from bml_schema.reading.document_splitter import document_spans
 
 
 def cut(text: str) -> list[str]:

@@ -8,7 +8,7 @@ from lxml import etree
 from bml_schema.behaviours import Speech
 from bml_schema.errors import CUSTOM_ATTRIBUTE_NOT_SUPPORTED, Fault, quoted
 from bml_schema.node_schema import NodeSchema, local
-from bml_schema.ssml import flat, mark_of
+from bml_schema.reading.ssml import flat, mark_of
 from bml_schema.values import is_name, name
 
 

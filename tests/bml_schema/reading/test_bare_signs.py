@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bml_schema import BMLError, Speech, parse
-from bml_schema.bare_signs import mend
+from bml_schema.reading.bare_signs import mend
 from tests.rows import each_row
 
 PLAIN = '<bml id="b"><speech id="s"><text>{}</text></speech></bml>'

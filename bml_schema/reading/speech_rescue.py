@@ -8,12 +8,12 @@ from typing import Any
 from lxml import etree
 
 from bml_schema.behaviours import Speech, SpeechText
-from bml_schema.element_reader import ElementReader
 from bml_schema.errors import CUSTOM_ATTRIBUTE_NOT_SUPPORTED, NOT_BML_1_0, Fault, did_you_mean, quoted
 from bml_schema.node_schema import local, path_below
 from bml_schema.nodes import CORE, DRAFTS, Description
-from bml_schema.ssml import MARKS
-from bml_schema.undeclared_prefixes import remove_element
+from bml_schema.reading.element_reader import ElementReader
+from bml_schema.reading.ssml import MARKS
+from bml_schema.reading.undeclared_prefixes import remove_element
 
 _UNREAD = "unread"  # the tag of elements of which only the content stays
 

@@ -14,10 +14,7 @@ from typing import Any, NamedTuple
 from lxml import etree
 
 from bml_schema.behaviours import Speech
-from bml_schema.block_outline import BlockOutline, Entry, flat
 from bml_schema.canonical import attributes
-from bml_schema.dropped_references import ReferenceRemover
-from bml_schema.element_reader import ElementReader, Vocabulary
 from bml_schema.errors import (
     BEHAVIOR_TYPE_NOT_SUPPORTED,
     CUSTOM_ATTRIBUTE_NOT_SUPPORTED,
@@ -33,6 +30,9 @@ from bml_schema.errors import (
 )
 from bml_schema.node_schema import local, path_below, schema_of
 from bml_schema.nodes import CORE, EXTENSIONS, Behaviour, Block, Constraint, Required
+from bml_schema.reading.block_outline import BlockOutline, Entry, flat
+from bml_schema.reading.dropped_references import ReferenceRemover
+from bml_schema.reading.element_reader import ElementReader, Vocabulary
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names
 from bml_schema.values import block_names, describe_mismatch, is_name

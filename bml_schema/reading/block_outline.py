@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 from lxml import etree
 
 from bml_schema.behaviours import SpeechText
-from bml_schema.element_reader import ElementReader
 from bml_schema.node_schema import local, schema_of
 from bml_schema.nodes import Behaviour, Constraint, Description, Required
-from bml_schema.ssml import ANY_MARK, mark_of
+from bml_schema.reading.element_reader import ElementReader
+from bml_schema.reading.ssml import ANY_MARK, mark_of
 from bml_schema.steps import next_element
 from bml_schema.sync_refs import Names, Points
 
