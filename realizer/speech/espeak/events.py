@@ -209,7 +209,7 @@ def _is_vowel(sound: str) -> bool:
 
 
 def read_answer(head: Mapping[str, Any], body: bytes) -> tuple[list[Event], Int16]:
-    """Parse an answer to "say" of `espeak.worker`.
+    """Parse an answer to "say" of `espeak_worker`.
 
     Return (type, sample, place, text) of words, marks, phonemes and ends in order, where `text` is a
     phoneme's IPA or a mark's name; and (n,) int16 samples, read-only.
