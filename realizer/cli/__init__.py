@@ -1,8 +1,11 @@
 """The command line interface."""
 
 import errno
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
 import click
@@ -46,6 +49,7 @@ def cli(context: click.Context, verbose: bool, quiet: bool) -> None:
       1  a document was refused, or `check` found a fault
       2  wrong usage, such as an unknown option, face or voice
       3  something is missing on this machine; the message says what
+    130  it was interrupted (Ctrl-C), 143 terminated; a file that it was writing is as it was before
     """
     use_one_thread()
     progress.configure_logging(context, quiet=quiet, verbose=verbose)
@@ -58,7 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         arguments: words after `realizer`; None: those of the process.
     """
     try:
-        status = cli(arguments, standalone_mode=False)
+        with _exiting_on_signals():
+            status = cli(arguments, standalone_mode=False)
         sys.exit(status if isinstance(status, int) else 0)
     except click.Abort:
         sys.exit(130)
@@ -77,6 +82,34 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         words = f"realizer: {error.filename or ''}: {error.strerror or error}{advice}"
         click.echo(words.replace(" : ", " "), err=True)
         sys.exit(2 if isinstance(error, FileNotFoundError) else 3)
+
+
+# Signal -> what standard error says of it.
+ENDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+
+
+@contextmanager
+def _exiting_on_signals() -> Iterator[None]:
+    """Exit with 130 or 143 at a signal, after all `finally` blocks; a second one ends the process at once.
+
+    Commands that end in order by themselves, such as `serve`, have handlers of their own.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread can have handlers
+        return
+
+    def end(number: int, frame: object) -> NoReturn:
+        for each in ENDS:
+            signal.signal(each, signal.SIG_DFL)
+        click.echo(f"realizer: {ENDS[signal.Signals(number)]}", err=True)
+        sys.exit(128 + number)
+
+    before = {each: signal.signal(each, end) for each in ENDS}
+    try:
+        yield
+    finally:
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def _help_of(error: click.ClickException) -> str:

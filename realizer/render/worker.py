@@ -1,6 +1,7 @@
 """The drawing process: poses on stdin, pixels in shared memory, files on stdout; by OpenGL or without it."""
 
 import os
+import signal
 import sys
 from collections.abc import Iterator, Mapping
 from multiprocessing.connection import Connection
@@ -196,6 +197,7 @@ def check(backend: str) -> int:
 def main(arguments: list[str]) -> int:
     if arguments[:1] == ["--check"]:
         return check(*arguments[1:])
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the owner
     orders = connection(0, writes=False)
     answers = connection(1, writes=True)
     os.dup2(2, 1)  # output of libraries must not mix with the answers

@@ -1,6 +1,7 @@
 """The command line as its user sees it: texts, exit status, files."""
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import pytest
 
 from realizer.speech.espeak.voice import EspeakVoice
 from tests.commands import run
+from tests.interrupts import SIGNALS, check_interrupted
 
 GOOD = '<bml id="b"><head id="n" lexeme="NOD" start="1"/></bml>'
 DROPS = '<bml id="b">\n<head id="n" lexeme="NOD" amount="7"/>\n<head id="m" lexeme="SHAKE"/></bml>'
@@ -254,3 +256,15 @@ def test_realize_refuses_a_file_of_rules_that_cannot_be_read(tmp_path: Path) -> 
     done = run("realize", "-", "--cooccurrence", str(tmp_path / "rules.toml"), stdin=GOOD)
     assert done.returncode == 2
     assert "rules.toml" in done.stderr
+
+
+@pytest.mark.parametrize("ending", SIGNALS, ids=lambda row: row[0].name)
+@pytest.mark.parametrize(
+    ("arguments", "event"),
+    [(("realize", "long.bml", "-o", "film.mp4"), ".film.*"), (("demo",), ".demo.mp4.*")],
+    ids=["realize", "demo"],
+)
+def test_interrupted_command_says_so_and_keeps_what_was_there(
+    arguments: tuple[str, ...], event: str, ending: tuple[signal.Signals, int, str], tmp_path: Path
+) -> None:
+    check_interrupted(arguments, event, ending, tmp_path)

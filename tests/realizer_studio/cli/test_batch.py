@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
 from realizer.cli import cli
+from tests.interrupts import SIGNALS, check_interrupted
 
 NOD = '<bml id="b"><head id="n" lexeme="NOD"/></bml>'
 
@@ -90,3 +92,11 @@ def test_batch_refuses_a_place_without_documents(tmp_path: Path) -> None:
 
     with pytest.raises(click.UsageError, match="nowhere: wanted a document"):
         batch("nowhere", "-o", str(tmp_path / "out"), "--format", "fap")
+
+
+@pytest.mark.parametrize("ending", SIGNALS, ids=lambda row: row[0].name)
+def test_interrupted_batch_says_so_and_keeps_what_was_there(
+    ending: tuple[signal.Signals, int, str], tmp_path: Path
+) -> None:
+    words = ("batch", "long.bml", "-o", ".", "--format", "mp4", "--workers", "1")
+    check_interrupted(words, ".manifest.lock", ending, tmp_path)
