@@ -50,6 +50,7 @@ def show_intentions(root: Any, fml: Any, used: set[str], apply: Callable[[Row], 
         used: the ids of the document, to which those of the new behaviours are added.
     """
     space = "".join(str(root.tag).rpartition("}")[:2])
+    numbers: dict[str, Iterator[int]] = {}
     for intention in fml:
         name, type = local(str(intention.tag)), (intention.get("type") or "").strip()
         row = next((row for row in intentions() if row.element == name and row.fits(type)), None)
@@ -60,7 +61,7 @@ def show_intentions(root: Any, fml: Any, used: set[str], apply: Callable[[Row], 
         for point, time in list(times.items()):
             if ":" in time and time.partition(":")[0].strip() not in used:
                 apply(Row("Greta", name, point, times.pop(point), "-", ""))
-        ids = _ids(intention.get("id", "").strip() or name, used)
+        ids = _ids(intention.get("id", "").strip() or name, used, numbers)
         for shown in becomes.split(";") if becomes != "-" else ():
             tag, *attributes = shown.split()
             element = etree.SubElement(root, own(tag) if tag == "emotion" else f"{space}{tag}")
@@ -80,10 +81,10 @@ def _scaled(value: str, intention: Any) -> str:
     return decimal(round(float(value) * min(max(factor, 0.0), 1.0), 4))
 
 
-def _ids(id: str, used: set[str]) -> Iterator[str]:
+def _ids(id: str, used: set[str], numbers: dict[str, Iterator[int]]) -> Iterator[str]:
     """Yield ids that no other behaviour has: the id itself, then with numbers."""
     id = "".join("-" if c in ": " else c for c in id)
-    for candidate in chain((id,), (f"{id}-{n}" for n in count(2))):
+    for candidate in chain((id,), (f"{id}-{n}" for n in numbers.setdefault(id, count(2)))):
         if candidate not in used:
             used.add(candidate)
             yield candidate

@@ -62,16 +62,16 @@ def translate_elements(root: etree._Element) -> dict[Any, str]:
         Element, or the root for its attributes -> how it was read.
     """
     translation = _Translation(root)
-    read: dict[Any, str] = {}
-    for element in [root, *translation.timed()]:
-        translation.applied = {}
-        if element is root:
-            translation.translate_attributes()
-        else:
-            translation.translate_element(element)
-        if translation.applied:
-            read[element] = Report(translation.applied).text
-    return read
+    translation.translate_attributes()
+    applied: dict[Any, dict[Row, None]] = {root: translation.applied}
+    for element in list(translation.timed()):
+        translation.applied = applied[element] = {}
+        translation.translate_element(element)
+    points = translation.points()
+    for element in list(translation.timed()):
+        translation.applied = applied[element]
+        translation.translate_points(element, points)
+    return {element: Report(rows).text for element, rows in applied.items() if rows}
 
 
 def dialect_of(root: etree._Element, wrapper: str) -> str:
@@ -99,7 +99,7 @@ class _Translation:
     def run(self) -> None:
         self.translate_attributes()
         self._children(self.root)
-        points = self._points()
+        points = self.points()
         for element in self.timed():
             points.translate(element)
         self._references(self.root, points)
@@ -110,11 +110,13 @@ class _Translation:
     def translate_element(self, element: Any) -> None:
         """Translate one behaviour or constraint, which stays in any case."""
         self._element(element, stays=True)
-        points = self._points()
+
+    def translate_points(self, element: Any, points: SyncPoints) -> None:
+        """Translate the sync points of one behaviour or constraint, and those that it refers to."""
         points.translate(element)
         self._references(element, points)
 
-    def _points(self) -> SyncPoints:
+    def points(self) -> SyncPoints:
         kinds = {e.get("id", "").strip(): self._kind(e) for e in self.timed()}
         return SyncPoints(kinds, self.apply, self.in_dialect)
 

@@ -184,7 +184,7 @@ class _Lines(NamedTuple):
 class _Reader:
     """The state of reading one block."""
 
-    __slots__ = ("elements", "line", "names", "owners", "places", "problems", "rescued")
+    __slots__ = ("elements", "line", "names", "numbers", "owners", "places", "problems", "rescued")
 
     def __init__(
         self,
@@ -193,6 +193,7 @@ class _Reader:
         rescued: Mapping[etree._Element, Sequence[Fault]] | None,
     ) -> None:
         self.rescued = rescued
+        self.numbers = count(1)  # of speeches without an id
         self.elements = outline.elements
         self.names = outline.names
         self.owners = outline.owners
@@ -250,7 +251,7 @@ class _Reader:
             wrong = f"id: wanted {NAME.wanted}, got {quoted(entry.id) if entry.id else 'none'}"
         if not wrong and self.owners.get(entry.id, entry) is entry:
             return entry
-        id = next(id for n in count(1) if (id := f"speech{n}") not in self.owners)
+        id = next(id for n in self.numbers if (id := f"speech{n}") not in self.owners)
         reason = wrong or f"id: wanted one of its own, got {quoted(entry.id)}"
         element = entry.element
         element.set("id", id)

@@ -15,6 +15,7 @@ from bml_schema.reading.element_reader import ElementReader
 from bml_schema.reading.ssml import MARKS
 from bml_schema.reading.undeclared_prefixes import remove_element
 
+_MOST = 50  # faults of one speech that are reported
 _UNREAD = "unread"  # the tag of elements of which only the content stays
 
 
@@ -68,10 +69,11 @@ def _around(speech: Any, root: Any) -> list[Any]:
 def _mend_speech(speech: Any, reader: ElementReader) -> list[Fault]:
     """Join the words of a <speech> in one <text>, with the marks that can be read; return what was wrong."""
     faults: list[Fault] = []
-    paths = {element: path_below(element, speech, "") for element in speech.iter()}
 
     def note(text: str, element: Any) -> None:
-        faults.append(Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED, paths[element]))
+        if len(faults) < _MOST:  # each costs a walk to find its path
+            path = path_below(element, speech, "")
+            faults.append(Fault(text, element, CUSTOM_ATTRIBUTE_NOT_SUPPORTED, path))
 
     for child in [child for child in speech if reader.tag(child) == Description.tag]:
         try:
@@ -89,7 +91,7 @@ def _mend_speech(speech: Any, reader: ElementReader) -> list[Fault]:
     if loose:
         note(f"wanted elements, got the text {quoted(loose)}, put it into <text>; it is spoken", speech)
     for child in content:
-        if child in texts:
+        if reader.tag(child) == SpeechText.tag:
             child.tail = f" {child.tail or ''}"
         elif (name := local(str(child.tag))) not in MARKS:
             near = did_you_mean(name, ["text"])

@@ -112,7 +112,7 @@ class _PlanBuilder:
         # Speeches that are placed one after the other, as `Member.sequences`; None if they must not be.
         self.sequences: list[tuple[str | float, str | float]] | None = []
         # Pairs of speeches, of which the second waits for the first.
-        self.turns: list[tuple[str, str]] = []
+        self.turns: dict[tuple[str, str], None] = {}
 
     def add_problems(self) -> None:
         for problem in self.block.problems:
@@ -228,9 +228,9 @@ class _PlanBuilder:
 
     def speak_in_turn(self, trial: Trial) -> bool:
         """The time of speech goes that has none of its own, or that ends after the speech it begins in."""
-        new = [pair for pair in self.found_turns() if pair not in self.turns]
-        self.turns += new
-        return bool(new) and self.begin_again(trial)
+        known = len(self.turns)
+        self.turns |= dict.fromkeys(self.found_turns())
+        return len(self.turns) > known and self.begin_again(trial)
 
     def found_turns(self) -> Iterator[tuple[str, str]]:
         """Yield pairs of speeches of this block that conflict: one, and one that can wait for its end."""
