@@ -386,7 +386,7 @@ def test_say_takes_words_in_milliseconds_with_a_warning() -> None:
             (warning,) = end.warnings
             assert "taken as milliseconds" in warning.text
 
-    serving(test, limit=10)
+    serving(test)
 
 
 def test_play_and_say_tell_that_nothing_was_heard_or_moved(caplog: pytest.LogCaptureFixture) -> None:
