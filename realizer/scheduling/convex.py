@@ -14,7 +14,7 @@ from realizer.scheduling.rigid_clusters import least_squares
 # Corrections of the active set after the interior point method; mostly one is enough.
 ROUNDS = 20
 # Up to this many unknowns a thread costs more time than it leaves to others.
-SMALL = 100
+SMALL = 200  # 3 ms, less than a slice of `SlicedCalls`
 # A force counts as none below this part of the greatest stiffness.
 RESTS = 1e-11
 
