@@ -61,7 +61,10 @@ def numbers_in_words(text: str, tag: str, before: str = "") -> str:
 def complete(text: str, tag: str, before: str = "") -> int:
     """Return the length of the part of a text whose numbers cannot change by what follows the text."""
     language = language_of(tag)
-    words = list(_WORD.finditer(text))
+    length = len(text)
+    # What is held back is short, so that the last words decide.
+    begin = text.find(" ", length - 2 * MAX_HELD) + 1 if length > 2 * MAX_HELD else 0
+    words = list(_WORD.finditer(text, begin))
     if language is None or not words:
         return words[-1].end() if words else 0
     busy = [bool(BUSY.search(word[0])) or bool(_triggers(language).search(word[0].strip())) for word in words]
@@ -81,9 +84,10 @@ def complete(text: str, tag: str, before: str = "") -> int:
             first = place
         if quiet > FEW or (not busy[place] and words[place][0].rstrip()[-1] in ".!?…:;"):
             break
-    if len(text) > MAX_HELD:
-        return next(word.start() for word in words if word.end() > len(text) - MAX_HELD // 2)
-    return words[first].start() if first < len(words) else words[-1].end()
+    cut = words[first].start() if first < len(words) else words[-1].end()
+    if length - cut > MAX_HELD:
+        cut = next(word.start() for word in words if word.end() > length - MAX_HELD // 2)
+    return cut
 
 
 def _applied(text: str, language: str) -> str:

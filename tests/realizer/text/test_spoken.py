@@ -114,3 +114,9 @@ def test_spoken_text_is_public_and_wants_a_text() -> None:
     assert realizer.spoken_text is spoken_text
     with pytest.raises(TypeError, match="wanted a text, got bytes"):
         spoken_text(b"hi")  # type: ignore[arg-type]
+
+
+def test_numbers_of_a_long_text_are_whole() -> None:
+    text = "It is very late today, on May 5, 2024, and it costs $1,250.50 now. " * 200
+    said = spoken_text(text)
+    assert said.count("May fifth, twenty twenty-four") == said.count("two hundred and fifty dollars") == 200
