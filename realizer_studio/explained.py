@@ -11,7 +11,6 @@ import numpy as np
 from bml_schema.node_schema import local
 from realizer.animation.axis import AU_NAMES
 from realizer.charts.chart_data import charts_of
-from realizer.charts.panels import Panel, panels
 from realizer.charts.picture import timeline
 from realizer.charts.scale import scale_of
 from realizer.charts.shapes import Picture
@@ -24,6 +23,7 @@ from realizer.playback.active_block import ActiveBlock
 from realizer.result import Realization
 from realizer.scheduling.problem import Member, problem_of
 from realizer.tables import faps
+from realizer_studio.document_panels import Panel, panels
 
 MOST = 8  # action units, FAPs and keys that are listed
 

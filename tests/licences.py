@@ -77,7 +77,7 @@ def text() -> str:
 
 def page() -> str:
     """Return the licences of the packages in the page's code; needs its node_modules."""
-    spec = importlib.util.spec_from_file_location("build_hook", WEB / "build_hook.py")
+    spec = importlib.util.spec_from_file_location("hatch_build", ROOT / "hatch_build.py")
     assert spec is not None
     assert spec.loader is not None
     hook = importlib.util.module_from_spec(spec)

@@ -17,7 +17,7 @@ MODULES = [
     name
     for package in (bml_schema, realizer, realizer_studio)
     for _, name, _ in pkgutil.walk_packages(package.__path__, package.__name__ + ".")
-    if not name.endswith(("__main__", "_worker", ".worker", ".build_hook"))
+    if not name.endswith(("__main__", "_worker", ".worker"))
 ]
 
 

@@ -13,10 +13,11 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-WEB = Path(__file__).resolve().parent
-CLIENT = WEB.parents[2] / "clients" / "javascript"
+ROOT = Path(__file__).resolve().parent
+WEB = ROOT / "realizer" / "server" / "web"
+CLIENT = ROOT / "clients" / "javascript"
 STATIC = WEB.parent / "static"
-SHADER = WEB.parents[1] / "render" / "surface.glsl"  # the page draws by the formula of stills
+SHADER = ROOT / "realizer" / "render" / "surface.glsl"  # the page draws by the formula of stills
 MARK = "sources.sha256"
 NOTICES = "THIRD_PARTY_NOTICES.txt"
 SKIP = "REALIZER_NO_PAGE"

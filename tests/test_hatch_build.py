@@ -10,18 +10,18 @@ from pathlib import Path
 import pytest
 
 pytest.importorskip("hatchling", reason="hatchling is needed to build, not to run")
-HOOK = Path(__file__).parents[4] / "realizer" / "server" / "web" / "build_hook.py"
+HOOK = Path(__file__).parents[1] / "hatch_build.py"
 pytestmark = pytest.mark.skipif(not HOOK.is_file(), reason="the page's sources are in the checkout alone")
 
 
 @pytest.fixture
 def hook(tmp_path, monkeypatch):
     """The hook over a copy of the sources, with a bundle that was made of them."""
-    spec = importlib.util.spec_from_file_location("build_hook", HOOK)
+    spec = importlib.util.spec_from_file_location("hatch_build", HOOK)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     web, static = tmp_path / "web", tmp_path / "static"
-    shutil.copytree(HOOK.parent, web, ignore=shutil.ignore_patterns("node_modules"))
+    shutil.copytree(HOOK.parent / "realizer/server/web", web, ignore=shutil.ignore_patterns("node_modules"))
     static.mkdir()
     for place in json.loads((web / "package-lock.json").read_text())["packages"]:
         (web / place).mkdir(parents=True, exist_ok=True)
@@ -35,7 +35,7 @@ def hook(tmp_path, monkeypatch):
 
 
 def build(hook):
-    return hook.PageBuildHook(str(HOOK.parents[3]), {}, None, None, "", "wheel", None)
+    return hook.PageBuildHook(str(HOOK.parent), {}, None, None, "", "wheel", None)
 
 
 def test_build_hook_keeps_a_bundle_of_these_sources(hook, monkeypatch) -> None:
@@ -85,7 +85,7 @@ def test_build_hook_explains_a_failure(hook, tmp_path, monkeypatch) -> None:
 
 
 def test_lock_file_names_no_host() -> None:
-    assert "resolved" not in (HOOK.parent / "package-lock.json").read_text("utf-8")
+    assert "resolved" not in (HOOK.parent / "realizer/server/web/package-lock.json").read_text("utf-8")
 
 
 def test_bundle_copies_the_page_as_it_is(hook, tmp_path, monkeypatch) -> None:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from realizer.charts.panels import MOST, Panel, panels
 from realizer.charts.scale import scale_of
 from realizer.charts.shapes import Box, Path, Picture, Text
+from realizer_studio.document_panels import MOST, Panel, panels
 
 
 def drawn(*parts: Panel) -> Picture:
