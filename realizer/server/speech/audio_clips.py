@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from realizer.core.array_types import Int16
+from realizer.core.decoder_process import DECODER
 from realizer.core.errors import RealizerError
 from realizer.protocol.messages.speech import SpeechMessage, TimedText
 from realizer.protocol.wire import ClipPiece
@@ -204,9 +205,7 @@ class AudioClips:
                 if clip.recogniser is not None:
                     clip.heard += clip.recogniser.close()
             else:
-                from realizer.behaviours.sound_file import read_sound  # most clips are PCM
-
-                sound = read_sound(content)
+                sound: Recording = DECODER.decode("realizer.behaviours.sound_file:read_sound", content)
                 clip.sound, clip.warnings = (sound.rate, sound.pcm), sound.warnings
         except RealizerError as error:
             del self._clips[id]
