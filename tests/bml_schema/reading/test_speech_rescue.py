@@ -190,7 +190,8 @@ def test_words_are_spoken_whatever_is_wrong_around_them(
     played = realizer.realize(damaged, voice=SilentVoice())
     heard = spoken(played)
     assert all(heard[sound] >= count for sound, count in said.items() if sound), damaged
-    assert played.warnings or {*damages} <= HARMLESS, damaged
+    # A text that an SSML description replaces is not spoken.
+    assert played.warnings or {*damages} <= HARMLESS or "ssml+xml" in text, damaged
 
 
 def test_corpus_has_documents_for_the_law() -> None:
