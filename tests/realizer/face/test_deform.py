@@ -319,10 +319,10 @@ def test_deform_moves_a_lip_evenly_by_equal_faps(face: Face) -> None:
 
 def test_deform_opens_a_lower_lip_without_lumps(face: Face) -> None:
     measure = Measure.of(face)
-    move = measure.moves(WIDE)[measure.skin]
+    move = measure.displacement(WIDE)[measure.skin]
     lip = face.vertices[[face.feature_points[name] for name in LOWER]]
     away = np.linalg.norm(face.vertices[measure.skin][:, None] - lip, axis=2).min(axis=1)
-    off = np.linalg.norm(move - measure.average @ move, axis=1)[measure.seen & (away < 0.006)]
+    off = np.linalg.norm(move - measure.average @ move, axis=1)[measure.visible & (away < 0.006)]
     assert np.percentile(off, 95) < 0.00105
 
 
