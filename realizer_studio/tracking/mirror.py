@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from realizer.core.array_types import Float64
 from realizer.core.units import ANGLE_UNIT
@@ -51,7 +51,8 @@ class Mirror:
         try:
             with Image.open(io.BytesIO(jpeg), formats=("JPEG", "PNG", "WEBP")) as file:
                 picture = file.convert("RGB")
-        except (UnidentifiedImageError, OSError, ValueError, Image.DecompressionBombError) as error:
+        # Readers of damaged files raise more than they document, such as SyntaxError and struct.error.
+        except Exception as error:
             raise TrackingError(
                 f"wanted a JPEG, PNG or WebP picture, got {len(jpeg)} bytes of something else"
             ) from error

@@ -50,5 +50,10 @@ def test_mirror_sees_nobody_and_finds_who_comes_back() -> None:
 
 
 def test_mirror_refuses_what_is_no_picture() -> None:
-    with pytest.raises(TrackingError, match="wanted a JPEG"):
-        Mirror()(b"no picture", 0)
+    buffer = io.BytesIO()
+    Image.effect_noise((40, 40), 90).save(buffer, "png")
+    png = buffer.getvalue()
+    damaged = png[:33] + (400).to_bytes(4, "big") + png[37:]  # its first chunk of pixels ends too soon
+    for content in (b"no picture", b"", png[:40], damaged):
+        with pytest.raises(TrackingError, match="wanted a JPEG"):
+            Mirror()(content, 0)
