@@ -15,10 +15,10 @@ polishing, DAQP 0.11, which is dense; on a busy machine with 2 cores):
     PIQP                  0.32  1e-8      1.3   1e-6      28    4e-5      1.2   1e-5
     DAQP                  0.13  2e-14     9.9   9e-13     -               31    7e-16
 
-"Guess" solved sparse least squares with the active inequalities as equalities, and updated them until no
-multiplier had the wrong sign. It brought 7 % of the time of documents with violated inequalities, and nothing
-for large ones; so it went. realizer/scheduling/convex.py takes Clarabel's solution and makes it exact in the
-same way.
+"Guess" is realizer/scheduling/convex.py: it solves sparse least squares with the active inequalities as
+equalities, and updates the active set until all inequalities hold and no multiplier has the wrong sign. It is
+exact, takes one to three rounds here, and needs no library. Some problems without any slack make it cycle;
+those are solved by Clarabel, whose solution is made exact in the same way.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 from realizer.core import work
 from realizer.core.array_types import Float64
 from realizer.scheduling.conflict import Link
-from realizer.scheduling.convex import Quadratic, feasible_start, optimum
+from realizer.scheduling.convex import Quadratic, active_set, feasible_start, optimum
 from realizer.scheduling.graphs import components
 from realizer.scheduling.model import LOOSE, Index, Model, drop_least_gaps
 from realizer.scheduling.problem import ORIGIN, Relation
@@ -135,7 +135,9 @@ def solve_groups(
         return [cycle for group in groups if (cycle := _feasible(model, clusters, [group])[2])]
     if cycle:
         return [cycle]
-    x = optimum(problem.quadratic, level)
+    x = active_set(problem.quadratic, problem.start(clusters))
+    if x is None:
+        x = optimum(problem.quadratic, level)
     clusters.at[problem.points] = x[problem.number[model.root[problem.points]]] + model.shift[problem.points]
     return []
 
