@@ -137,7 +137,7 @@ def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> Non
                 await other.append("One.")
             assert (await other.ended()).status == "DONE"
 
-    serving(test)
+    serving(test, real_time=True)
 
 
 def test_speech_restored_in_another_process_refuses_more_text_too(tmp_path: Path) -> None:
