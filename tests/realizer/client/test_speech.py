@@ -289,7 +289,7 @@ def test_speech_with_the_id_of_one_being_spoken_leaves_that_alone() -> None:
                 await unused.append("Six.")
             assert (await unused.ended()).global_time > (await first.ended()).global_time
 
-    serving(test)
+    serving(test, real_time=True)
 
 
 def test_speech_with_the_id_of_an_open_one_continues_that() -> None:
