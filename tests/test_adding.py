@@ -35,8 +35,9 @@ def answers(message, now):
             yield getattr(effect, "data", "")
         session.tick(now + step / 100)
 
-greeting = "".join(answers('{"type": "greet", "name": "A & B"}', 0.0))
-assert "greeting:s" in greeting and "warning" not in greeting, greeting
+session.receive(1, '{"type": "greet", "id": "g1", "name": "A & B"}', 0.0)
+greeting = "".join(answers('{"type": "greet", "id": "g&2", "name": "Ada"}', 0.0))
+assert "g1:s" in greeting and "g&amp;2" in greeting and "warning" not in greeting, greeting
 assert any("wanted" in answer for answer in answers('{"type": "greet"}', 3.0))
 assert any("MAX_ID" in answer for answer in answers("<bml id='" + "x" * 21 + "'/>", 6.0))
 subscribe = '{"type": "subscribe", "stream": "lids", "encoding": "json"}'
