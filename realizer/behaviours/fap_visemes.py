@@ -47,7 +47,7 @@ def expand_compound(clip: FAPClip) -> FAPClip:
     relative = (clip.expressions[:, 4:5] == 1) * expressions
     values = np.where(clip.mask, clip.values + relative, mixed)
     # Between two visemes the lips are held at 0, so that no other behaviour moves them.
-    mask = clip.mask | (talking.any() & _mouths().any(axis=0)) | expressions.any(axis=0)
+    mask = clip.mask | (talking.any() & _viseme_shapes().any(axis=0)) | expressions.any(axis=0)
     mask[:2] = False
     values[:, :2] = 0
     count = len(values)
@@ -63,22 +63,22 @@ def expand_compound(clip: FAPClip) -> FAPClip:
 
 def _visemes(given: Int32, notes: list[str]) -> tuple[Float64, Float64]:
     """Return (n, 68) FAPs of the visemes, and (n,) 0..1 their total weight."""
-    selects = _selects(given[:, :2], len(_mouths()), "FAP 1: wanted visemes", notes)
-    share = _parts(given[:, 2], "FAP 1: wanted blends", notes)
-    _defines(given[:, 3], "FAP 1: viseme_def", notes)
+    selects = _known_numbers(given[:, :2], len(_viseme_shapes()), "FAP 1: wanted visemes", notes)
+    share = _fractions(given[:, 2], "FAP 1: wanted blends", notes)
+    _note_definition(given[:, 3], "FAP 1: viseme_def", notes)
     parts = np.stack([share, 1 - share], axis=1)
-    return np.einsum("np,npf->nf", parts, _mouths()[selects]), (parts * (selects > 0)).sum(axis=1)
+    return np.einsum("np,npf->nf", parts, _viseme_shapes()[selects]), (parts * (selects > 0)).sum(axis=1)
 
 
 def _expressions(given: Int32, notes: list[str]) -> Float64:
-    selects = _selects(given[:, [0, 2]], len(_faces()), "FAP 2: wanted expressions", notes)
-    parts = _parts(given[:, [1, 3]], "FAP 2: wanted intensities", notes)
-    _defines(given[:, 5], "FAP 2: expression_def", notes)
-    out: Float64 = np.einsum("np,npf->nf", parts, _faces()[selects])
+    selects = _known_numbers(given[:, [0, 2]], len(_expression_shapes()), "FAP 2: wanted expressions", notes)
+    parts = _fractions(given[:, [1, 3]], "FAP 2: wanted intensities", notes)
+    _note_definition(given[:, 5], "FAP 2: expression_def", notes)
+    out: Float64 = np.einsum("np,npf->nf", parts, _expression_shapes()[selects])
     return out
 
 
-def _selects(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
+def _known_numbers(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
     """Return the numbers, with 0, which is none, instead of unknown ones."""
     known = (given >= 0) & (given < count)
     if not known.all():
@@ -86,7 +86,7 @@ def _selects(given: Int32, count: int, wanted: str, notes: list[str]) -> Int32:
     return np.where(known, given, 0)
 
 
-def _parts(given: Int32, wanted: str, notes: list[str]) -> Float64:
+def _fractions(given: Int32, wanted: str, notes: list[str]) -> Float64:
     """Scale 0..63 to 0..1."""
     limited = np.clip(given, 0, MOST)
     if (limited != given).any():
@@ -95,13 +95,13 @@ def _parts(given: Int32, wanted: str, notes: list[str]) -> Float64:
     return parts
 
 
-def _defines(flags: Int32, name: str, notes: list[str]) -> None:
+def _note_definition(flags: Int32, name: str, notes: list[str]) -> None:
     if flags.any():
         notes.append(f"{name} gives a meaning of its own, which is not heeded")
 
 
 @cache
-def _mouths() -> Float64:
+def _viseme_shapes() -> Float64:
     """Return (15, 68) FAPU, a row a viseme."""
     shapes = shape_table()[0][:VISEME_COUNT]
     out = np.zeros((len(shapes), 68))
@@ -111,7 +111,7 @@ def _mouths() -> Float64:
 
 
 @cache
-def _faces() -> Float64:
+def _expression_shapes() -> Float64:
     """Return (7, 68) FAPU, a row an expression; 0 is none."""
     rows = fap_expressions()
     out = np.zeros((1 + max(row.number for row in rows), 68))

@@ -15,7 +15,7 @@ MAX_HELD = 400  # characters; of numbers that go on for longer, only the last pa
 FEW = 3  # words after a number that may belong to it
 ROMAN = r"(?:(?=[IVXL])(?:XL|L?X{0,3})(?:IX|IV|V?I{0,3}))"
 _SIGNS = "$€£¥₹¢%‰°#§½¼¾⅓⅔⅛*×·÷=<>≤≥≈~±№℃"
-# Text without these needs no tables.
+# Signs of a number or of a word that belongs to one; text without these stays as it is.
 BUSY = re.compile(
     rf"[0-9{re.escape(_SIGNS)}]|\b(?:[VXL]|[IVXL]{{2,}})(?:e|ème)?\b|\bIer\b"
     r"|\b(?:War|[Cc]hapter|[Pp]art|[Vv]olume|[Aa]ct|[Ss]cene|Elizabeth|Charles|James|Francis|Kapitel) I\b"
@@ -31,7 +31,7 @@ _DIGIT_ONLY = re.compile(r"[^0-9]")
 
 
 class Frame(NamedTuple):
-    """A pattern, and the words for what it matches."""
+    """A pattern of a number with its surroundings, such as a date, and the words for what it matches."""
 
     pattern: re.Pattern[str]
     words: str

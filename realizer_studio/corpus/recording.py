@@ -51,7 +51,7 @@ class Annotation:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """An expression or a word from its first to its last frame (eq. 6.1)."""
+    """An expression or a word from its first to its last frame (Wojdel 2005, eq. 6.1)."""
 
     first: int
     last: int

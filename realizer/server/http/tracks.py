@@ -17,7 +17,7 @@ RATE = 48000  # Hz, that of Opus
 SAMPLES = round(PACKET * RATE)
 PICTURE_CLOCK = 90000  # Hz
 ENCODING = 0.012  # s; until pictures have shown how long it takes
-SLOWNESS = 10  # pictures over which this time is averaged
+AVERAGED = 10  # pictures over which this time is averaged
 MOST_PICTURES = 8  # that wait; older ones are left out
 MOST_BEHIND = 5  # packets
 QUIET = 300  # of 32768: in a packet without louder samples the delay may change
@@ -142,7 +142,7 @@ class PictureTrack(VideoStreamTrack):
         """Return the newest picture that is due; wait for it. Its caller has sent the one before."""
         loop = asyncio.get_running_loop()
         if self._pts >= 0:
-            self._encoding += (loop.time() - self._taken - self._encoding) / SLOWNESS
+            self._encoding += (loop.time() - self._taken - self._encoding) / AVERAGED
         while True:
             if self.readyState != "live":
                 raise MediaStreamError

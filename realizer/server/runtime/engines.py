@@ -26,7 +26,7 @@ IDLE = 5.0  # s; a renderer unused for so long makes room for another one
 
 @dataclass(slots=True)
 class _RendererSlot:
-    """A renderer."""
+    """A renderer, and whether it is in use."""
 
     renderer: Renderer
     used: float  # when it drew last, seconds on the clock of `Engines`
@@ -35,7 +35,7 @@ class _RendererSlot:
 
 
 class Engines:
-    """The voices and renderers. `speak` and `draw` may be called by the threads of their pools."""
+    """The voices, the renderers and their pools of threads, which call `speak`, `draw` and `look`."""
 
     def __init__(self, deformer: str | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._deformer = deformer
@@ -87,7 +87,7 @@ class Engines:
             return RealizerError(f"the picture could not be tracked: {error}")
 
     def drop(self, owner: Hashable) -> None:
-        """Drop the requests of an owner that wait in the pools."""
+        """Drop the requests of an owner that wait in the pools, except files to save."""
         for pool in (self.tracking_pool, self.speech_pool, self.render_pool):
             pool.drop(owner)
 

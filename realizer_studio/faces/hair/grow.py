@@ -20,7 +20,7 @@ CAP = 0.0011  # m; height of the cap above the skin
 SOFT = 0.016  # m from the hairline over which the cap gets dense
 FADE = 0.42  # the share of its texture for that
 TURN, AROUND = 0.012, 0.085  # m; width of the cap's texture, and radius of the head
-DEEP = 0.13
+DEEP = 0.13  # m further in over which the rest of the texture is shown
 
 
 def hair(scalp: Scalp, triangles: Int32, style: Style, colour: Any, rng: Any) -> Patch:
