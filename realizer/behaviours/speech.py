@@ -18,7 +18,7 @@ from realizer.speech.recorded.given_times import given_times, with_times
 from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest, Utterance
 
 # An attribute of <speech>: sentences about what of a text is not in its words.
-UNSAID = f"{{{OWN}}}unsaid"
+UNSAID = f"{{{OWN}:text}}unsaid"
 # Stiffness of a second of speech, which is that of a stiff gap of the face; shorter gaps are stiffer.
 STIFFNESS = 1000.0
 MIN_GAP = 0.01  # s; limits the stiffness of very short gaps

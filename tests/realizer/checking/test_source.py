@@ -36,6 +36,11 @@ def test_check_finds_nothing_in_a_text_that_is_spoken() -> None:
     assert realizer.check("Hello there") == []
 
 
+def test_check_says_once_what_is_left_out_of_a_text() -> None:
+    (finding,) = realizer.check("Hello <breeak/> there.")
+    assert "<breeak>" in finding.text
+
+
 def test_check_adds_advice_on_request() -> None:
     early = '<bml id="b"><gaze id="g" target="ball" start="0" end="2"/></bml>'
     assert realizer.check(early) == []
