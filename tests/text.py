@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realizer.core.toml_text import parse_toml
+from realizer.sources import is_markup
 from realizer.tables import toml_table
 from realizer.tables.lexemes import face_lexemes, head_lexemes
 from realizer.text import marks, numbers, spellout
@@ -20,6 +21,7 @@ ROOT = Path(__file__).parent.parent
 CLIENT = ROOT / "clients" / "javascript"
 TABLES = CLIENT / "src" / "text-tables.js"
 CASES = CLIENT / "test" / "text-cases.json"
+MARKUP = CLIENT / "test" / "markup-cases.json"
 PAGE = ROOT / "docs" / "text.md"
 BEGIN, END = "<!-- marks: written by python -m tests.text -->", "<!-- end of marks -->"
 ROWS = ROOT / "tests" / "realizer" / "text"
@@ -32,6 +34,7 @@ def tables() -> str:
     known = {unicodedata.lookup(name): shows for shows, names in table["emoji"].items() for name in names}
     emoticons = {sign: name for name, signs in table["emoticons"].items() for sign in signs.split()}
     values: dict[str, Any] = {
+        "elements": table.pop("elements"),
         "marks": {**table, "emoji": known, "emoticons": emoticons},
         "lexemes": {"face": sorted(face_lexemes()), "head": sorted(head_lexemes())},
         "numbers": toml_table(numbers.FILE),
@@ -54,6 +57,13 @@ def cases() -> str:
         values = [text, language, said.text, said.markup, behaviours, list(said.warnings)]
         lines.append(json.dumps(values, ensure_ascii=False))
     return "[\n" + ",\n".join(lines) + "\n]\n"
+
+
+def markup_cases() -> str:
+    """Return texts and whether Python takes each as a document, one a line."""
+    texts = parse_toml((ROWS / "markup.toml").read_text("utf-8"))
+    rows = [(text, is_markup(text)) for text in [*texts["documents"], *texts["texts"]]]
+    return "[\n" + ",\n".join(json.dumps(row, ensure_ascii=False) for row in rows) + "\n]\n"
 
 
 def page() -> str:
@@ -82,7 +92,7 @@ def page() -> str:
     return f"{before}{BEGIN}\n" + "\n".join(lines) + f"\n{END}{rest.partition(END)[2]}"
 
 
-FILES = {TABLES: tables, CASES: cases, PAGE: page}
+FILES = {TABLES: tables, CASES: cases, MARKUP: markup_cases, PAGE: page}
 
 if __name__ == "__main__":
     for path, make in FILES.items():

@@ -182,6 +182,9 @@ export function frameOf(buffer: ArrayBuffer): Frame;
 /** Encode a picture for `track`: the bytes of its file, and a number of your own. */
 export function packPicture(number: number, file: Uint8Array): Uint8Array;
 
+/** Whether a text is BML or another document, for `play`, and not words with some markup in them, for `speak`. */
+export function isMarkup(text: string): boolean;
+
 /** An estimate of the session clock. */
 export class Clock {
   reset(): void;

@@ -34,6 +34,7 @@
  * What the messages are: asyncapi.json, which the service serves beside realizer.js.
  */
 export { RealizerError, VERSION, frameOf, packPicture } from "./frames.js";
+export { isMarkup } from "./markup.js";
 export { Clock, DELAY } from "./playout.js";
 export { BMLA, Realizer } from "./realizer.js";
 export { Sound } from "./sound.js";

@@ -9,7 +9,7 @@
  */
 import MarkdownIt from "markdown-it";
 import { numbersInWords } from "./text-numbers.js";
-import { lexemes, marks } from "./text-tables.js";
+import { elements as names, lexemes, marks } from "./text-tables.js";
 
 const BEFORE = 80; // characters of what was spoken before
 const LONGEST_PARAGRAPH = 2000; // characters; longer ones are read in pieces
@@ -33,7 +33,7 @@ const VOWELS = "aeiou";
 
 const words = (text) => new Set(text.split(" ").filter(Boolean));
 const words_ = { before: words(marks.context.before), subjects: words(marks.context.subjects), never: words(marks.context.never) };
-const elements = Object.fromEntries(Object.entries(marks.elements).map(([kind, names]) => [kind, words(names)]));
+const elements = Object.fromEntries(Object.entries(names).map(([kind, all]) => [kind, words(all)]));
 const feelings = { pause: "pause" };
 for (const [name, alike] of Object.entries(marks.emotions.alike)) for (const word of words(alike)) feelings[word] = name;
 for (const name of words(marks.emotions.names)) feelings[name] = name;
