@@ -35,19 +35,25 @@ class UnknownName(ToolError):
 
 
 def lint(text: str, settings: Settings) -> str:
-    """Return faults and advice for BML as JSON: {"faults": [{type, id, text, notes, spots}]}.
+    """Return faults and advice for BML or a text as JSON: {"faults": [{type, id, text, notes, spots}]}.
 
     A spot is {line, column, length, text, primary}, from 1, in characters; the first primary one is the place
-    of the fault. Faults are those of `realizer check`; advice has the type "ADVICE".
+    of the fault. Faults are those of `realizer check`; advice has the type "ADVICE". What is left out of a
+    text that is no markup is advice without spots.
     """
     from realizer.checking.source import findings_of
     from realizer.playback.player import Player
+    from realizer.sources import is_markup, spoken
 
     if len(text) > MAX_TEXT:
         words = f"wanted at most {MAX_TEXT} characters, got {len(text)}: `realizer check` reads more"
         return json.dumps({"faults": [], "skipped": words})
-    findings = findings_of("document", text, Player(settings.play_options()), MAX_FINDINGS)
+    plain = text.strip() != "" and not is_markup(text)
+    document = spoken(text, language=settings.language) if plain else text
+    findings = findings_of("document", document, Player(settings.play_options()), MAX_FINDINGS)
     faults = [_finding_json(finding) for finding in islice(findings, MAX_FINDINGS)]
+    if plain:  # the places are in a document that the user does not see
+        faults = [{**fault, "type": "ADVICE", "spots": []} for fault in faults]
     return json.dumps({"faults": faults}, ensure_ascii=False)
 
 

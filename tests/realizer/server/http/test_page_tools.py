@@ -39,6 +39,19 @@ def test_lint_names_a_hundred_faults_at_most() -> None:
     assert len(faults_of(f'<bml id="a">{nods}</bml>')) == 100
 
 
+@pytest.mark.parametrize(
+    "text", ["Hello **there**.", "5 < 6", "I <3 *you*", "<b>Important</b>", '{"type": "stop"}']
+)
+def test_lint_finds_no_fault_in_a_text(text: str) -> None:
+    assert faults_of(text) == []
+
+
+def test_lint_says_what_is_left_out_of_a_text() -> None:
+    (fault,) = faults_of("Hello.\n\nThat is <breeak/> it.")
+    assert (fault["type"], fault["spots"]) == ("ADVICE", [])
+    assert "<breeak>" in fault["text"]
+
+
 @pytest.mark.parametrize("text", ["", "no markup", "<", "<bml", "\ud800", "<bml id='a'>" * 300])
 def test_lint_answers_any_text(text: str) -> None:
     assert isinstance(faults_of(text), list)
