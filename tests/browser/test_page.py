@@ -361,6 +361,15 @@ def test_page_plays_a_typed_document_and_shows_feedback(page) -> None:  # type: 
     assert [line for line in lines if line in wanted] == wanted
 
 
+def test_page_speaks_a_typed_text(page) -> None:  # type: ignore[no-untyped-def]
+    page.fill("#document", "Hello **there**.")
+    page.wait_for_selector("#problems-text:has-text('No faults')")
+    assert page.locator(".cm-lintRange, .cm-lint-marker").count() == 0
+    page.click("#play")
+    page.wait_for_selector("#log .block:has-text('ends')")
+    assert page.locator("#log :is(.warning, .error)").count() == 0
+
+
 def test_page_reports_a_broken_document_and_goes_on(page) -> None:  # type: ignore[no-untyped-def]
     page.fill("#document", '<bml id="broken"><head')
     page.click("#play")

@@ -8,7 +8,7 @@ import { LabelTab } from "./label/tab.js";
 import { Log } from "./log.js";
 import { Mirror } from "./mirror.js";
 import { download, Pose } from "./pose.js";
-import { Clock, Realizer, Sound } from "bml-realizer-client";
+import { Clock, isMarkup, Realizer, Sound } from "bml-realizer-client";
 import { Recorder } from "./record.js";
 import { ActionUnits, Faps } from "./sliders.js";
 import { ask, token } from "./service.js";
@@ -197,6 +197,11 @@ function play(replace) {
   hear();
   timeline.look(null);
   const text = editor.text;
+  if (text.trim() && !isMarkup(text)) {
+    // One text follows another. The log has what becomes of it, and why it is refused.
+    link.speak(text, { composition: replace ? "REPLACE" : "APPEND" }).catch(() => {});
+    return;
+  }
   const id = text.match(BLOCK)?.[3];
   // An id is free again when its block has ended; until then the same document plays under a new one.
   const own = alive.has(id) ? text.replace(BLOCK, `$1$2$3-${++plays}$2`) : text;
@@ -212,7 +217,7 @@ function replacing(text) {
 }
 
 function showFaults(found) {
-  faults = (found ?? []).filter((fault) => fault.spots.length || fault.type !== "ADVICE");
+  faults = found ?? [];
   const count = (some, one) => (some.length ? `${some.length} ${one}${some.length > 1 && one === "fault" ? "s" : ""}` : "");
   const bad = faults.filter(({ type }) => type !== "ADVICE");
   const advice = faults.filter(({ type }) => type === "ADVICE");

@@ -1,4 +1,4 @@
-// The BML editor: CodeMirror with our colours, completion from the vocabulary, faults from the service.
+// The editor of texts and BML: CodeMirror with our colours, completion from the vocabulary, faults from the service.
 import { autocompletion, closeBrackets, closeBracketsKeymap, completionKeymap } from "@codemirror/autocomplete";
 import { defaultKeymap, history, historyKeymap, indentWithTab } from "@codemirror/commands";
 import { xml } from "@codemirror/lang-xml";
@@ -6,11 +6,12 @@ import { bracketMatching, foldGutter, foldKeymap, HighlightStyle, indentOnInput,
 import { forceLinting, lintGutter, linter, lintKeymap } from "@codemirror/lint";
 import { highlightSelectionMatches, searchKeymap } from "@codemirror/search";
 import { Compartment, EditorState } from "@codemirror/state";
-import { drawSelection, EditorView, highlightActiveLine, highlightActiveLineGutter, keymap, lineNumbers, tooltips } from "@codemirror/view";
+import { drawSelection, EditorView, highlightActiveLine, highlightActiveLineGutter, keymap, lineNumbers, placeholder, tooltips } from "@codemirror/view";
 import { tags } from "@lezer/highlight";
 import { completer } from "./complete.js";
 
 const PAUSE = 300; // ms between the last key and a check
+const EXAMPLE = "Hello there. *smiles* How are you?";
 
 const colours = HighlightStyle.define([
   { tag: tags.tagName, color: "var(--code-tag)" },
@@ -48,12 +49,12 @@ export class Editor {
           lineNumbers(), foldGutter({ openText: "⌄", closedText: "›" }), highlightActiveLineGutter(), lintGutter(),
           history(), drawSelection(), indentOnInput(), bracketMatching(), closeBrackets(), highlightActiveLine(), highlightSelectionMatches(),
           EditorState.tabSize.of(2), EditorView.lineWrapping,
-          xml({ autoCloseTags: true }),
+          xml({ autoCloseTags: true }), placeholder(EXAMPLE),
           syntaxHighlighting(colours),
           this.completion.of([]),
           linter(lint, { delay: PAUSE, needsRefresh: null }),
           tooltips({ parent: document.body }),
-          EditorView.contentAttributes.of({ id: "document", "aria-label": "BML document", tabindex: "0", spellcheck: "false", autocapitalize: "off" }),
+          EditorView.contentAttributes.of({ id: "document", "aria-label": "Text or BML", "aria-describedby": "editor-help", tabindex: "0", spellcheck: "false", autocapitalize: "off" }),
           keymap.of([...closeBracketsKeymap, ...defaultKeymap.filter(({ key }) => key !== "Mod-Enter"), ...searchKeymap, ...historyKeymap, ...foldKeymap, ...completionKeymap, ...lintKeymap, indentWithTab]),
         ],
       }),
@@ -82,8 +83,9 @@ export class Editor {
   }
 }
 
-// A mark for each place of a fault; places that only explain it are hints.
+// A mark for each place of a fault; places that only explain it are hints. Advice without a place is about a whole text.
 function diagnostics(doc, fault) {
+  if (!fault.spots.length && fault.type === "ADVICE") return [];
   const serious = fault.type === "ADVICE" ? "warning" : "error";
   const spots = fault.spots.length ? fault.spots : [{ line: 1, column: 1, length: 1, text: "", primary: true }];
   return spots.map((spot) => {
