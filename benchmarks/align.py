@@ -20,10 +20,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from realizer.core.errors import RealizerError
-from realizer.speech.align.aligner import align
-from realizer.speech.align.alignment import Alignment
 from realizer.speech.registry import find_voice
 from realizer.speech.utterance import SpeechRequest
+from realizer_studio.align.aligner import align
+from realizer_studio.align.alignment import Alignment
 
 RECORDINGS = Path("/usr/share/pocketsphinx/test/data/librivox")
 NEEDED = "no recordings in {}: apt-get install pocketsphinx-testdata, or --recordings DIR"

@@ -13,9 +13,9 @@ import numpy as np
 from align import SENTENCES
 
 from realizer.core.errors import RealizerError
-from realizer.speech.align.aligner import align
 from realizer.speech.registry import find_voice
 from realizer.speech.utterance import SpeechRequest
+from realizer_studio.align.aligner import align
 
 
 def main() -> None:

@@ -54,7 +54,7 @@ LAYERS = (
     "realizer.client realizer.asgi",
     "realizer.cli",
     "realizer.__main__",
-    "realizer_studio.analysis realizer_studio.batch",
+    "realizer_studio.align realizer_studio.analysis realizer_studio.batch",
     "realizer_studio.document_panels realizer_studio.recorded_sessions",
     "realizer_studio.explained",
     "realizer_studio.tracking",
@@ -99,7 +99,7 @@ IMPORTERS = {
     "hibari": ("realizer.speech.hibari.voice", "realizer.speech.hibari.hibari_worker"),
     "onnxruntime": ("realizer.speech.hibari.hibari_worker",),
     "redis": ("realizer.server.journal.redis_journal",),
-    "pocketsphinx": ("realizer.speech.align.sphinx",),
+    "pocketsphinx": ("realizer_studio.align.sphinx",),
     "starlette": ("realizer.server.http",),
     "uvicorn": ("realizer.server.http",),
     "prometheus_client": ("realizer.server.http.metrics",),
@@ -217,6 +217,7 @@ def test_entry_points_of_the_project_are_those_of_the_studio() -> None:
     points = importlib.metadata.distribution("bml-realizer").entry_points
     modules = {point.group: point.module for point in points if point.group != "console_scripts"}
     assert set(modules) == {
+        "realizer.aligners",
         "realizer.commands",
         "realizer.editors",
         "realizer.face_builders",

@@ -23,11 +23,11 @@ import numpy as np
 from realizer.animation.lips.visemes import sounds
 from realizer.behaviours.sound_file import read_wav
 from realizer.core.array_types import Float64, Index, Int16
-from realizer.speech.align.aligner import align
-from realizer.speech.align.alignment import AlignError
 from realizer.speech.registry import find_voice
 from realizer.speech.sound_visemes.mel_stream import viseme_facts
 from realizer.speech.utterance import Phoneme, SpeechRequest
+from realizer_studio.align.aligner import align
+from realizer_studio.align.alignment import AlignError
 
 DICTIONARIES = Path("/usr/share/dict")
 CZECH_WORDS = Path("/usr/share/hunspell/cs_CZ.dic")

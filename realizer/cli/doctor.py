@@ -56,7 +56,7 @@ def _parts() -> Iterator[Finding]:
     """Yield what works, or how to fix it, as soon as it is known."""
     from realizer.face.load import list_faces, load_face
     from realizer.render.drawing_process import available_backend
-    from realizer.speech.align.sphinx import install_hint
+    from realizer.speech.recorded.recorded_speech import ALIGNERS
     from realizer.speech.registry import voices
 
     descriptions = {"gl": "drawn by OpenGL", "onboard": "drawn by the processor, without OpenGL"}
@@ -64,8 +64,8 @@ def _parts() -> Iterator[Finding]:
     yield fix is None, "pictures", fix or descriptions[backend]
     for voice in voices():
         yield voice.available, voice.name, voice.description
-    fix = install_hint()
-    yield fix is None, "align", fix or "pocketsphinx finds words in recordings of English"
+    for _, aligner in ALIGNERS.working():
+        yield (fix := aligner.missing()) is None, "align", fix or aligner.description
     fix = _fix("film")
     yield fix is None, "FFmpeg", fix or "PyAV writes films"
     works = shutil.which("npm") is not None
@@ -125,9 +125,10 @@ def plugins(as_json: bool) -> None:
     from realizer.server.editors import EDITORS
     from realizer.server.session.tracked_faces import TRACKERS
     from realizer.server.transports.transport import TRANSPORTS
+    from realizer.speech.recorded.recorded_speech import ALIGNERS
     from realizer.speech.registry import VOICES
 
-    groups = (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES, BUILDERS, COMMANDS, EDITORS, TRACKERS)
+    groups = (FAMILIES, OUTPUTS, VOICES, TRANSPORTS, FACES, BUILDERS, COMMANDS, EDITORS, TRACKERS, ALIGNERS)
     found = [plugin for registry in groups for plugin in registry.plugins()]
     if as_json:
         click.echo(json.dumps([asdict(plugin) for plugin in found], indent=1))

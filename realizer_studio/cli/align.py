@@ -14,7 +14,7 @@ from realizer.cli.progress import waiting
 from realizer.core.errors import RealizerError
 
 if TYPE_CHECKING:
-    from realizer.speech.align.alignment import Alignment
+    from realizer_studio.align.alignment import Alignment
 
 
 @click.command()
@@ -34,7 +34,7 @@ def align(audio: Path, text: str, language: str, aligner: str | None, output: Pa
     realizer align talk.flac @talk.txt --language de -o talk.json
     """
     from realizer.behaviours.sound_file import read_sound
-    from realizer.speech.align.aligner import align as find_words
+    from realizer_studio.align.aligner import align as find_words
 
     inputs.check_suffix(output, ".json", ".vtt")
     if text.startswith("@"):

@@ -4,12 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from itertools import pairwise
-from typing import TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Bool, Float64, Int16
+from realizer.core.errors import PluginError
+from realizer.core.registry import Registry
 from realizer.speech.sound_visemes.mel_stream import viseme_facts
 from realizer.speech.sound_visemes.recogniser import recognised
 from realizer.speech.utterance import Phoneme, Recording, SpeechRequest, Utterance, Word, tile
@@ -32,6 +34,27 @@ CACHED = 8  # recordings; a document is planned more than once before it plays
 Timed = TypeVar("Timed", Word, Phoneme)
 
 
+class Aligner(Protocol):
+    """Finds the words of a text in a recording of it."""
+
+    description: str
+
+    def missing(self) -> str | None:
+        """Return what to install for its best results, or None."""
+
+    def __call__(self, request: SpeechRequest, recording: Recording, /) -> Utterance:
+        """Return the recording as an utterance; without words, but a warning, if it cannot be aligned."""
+
+
+# The first one is used.
+ALIGNERS: Registry[Aligner] = Registry(
+    "realizer.aligners",
+    {},
+    wanted="a realizer.speech.recorded.recorded_speech.Aligner",
+    accepts=lambda value: callable(value) and hasattr(value, "missing"),
+)
+
+
 def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     """Return a recording as an utterance, by its times if known, else by alignment, else by its sound.
 
@@ -48,14 +71,23 @@ def utterance_of(request: SpeechRequest, recording: Recording) -> Utterance:
     return replace(found, warnings=(*warnings, *found.warnings)) if warnings else found
 
 
+def _aligned(request: SpeechRequest, recording: Recording) -> Utterance:
+    """Return a recording with the words of its text where they are in the sound, or without words."""
+    try:
+        if not ALIGNERS:
+            raise PluginError("no aligner is installed (group realizer.aligners)")
+        return ALIGNERS[next(iter(ALIGNERS))](request, recording)
+    except PluginError as error:
+        warning = f"the words are not found in the recording: {error}"
+        return replace(_utterance(recording, (), (), {}), warnings=(warning,))
+
+
 def _placed(request: SpeechRequest, recording: Recording) -> Utterance:
-    # Imported here, because loading the aligners takes longer than most texts to speak.
-    from realizer.speech.align.aligner import align_recording
     from realizer.speech.registry import reference_voice
 
     if not recording.words and not recording.phonemes:
         if request.ssml.strip():
-            found = align_recording(request, recording)
+            found = _aligned(request, recording)
             return found if found.phonemes else replace(found, phonemes=_by_sound(recording))
         return _utterance(recording, (), _by_sound(recording), {})
     words, phonemes = recording.words, recording.phonemes

@@ -51,7 +51,7 @@ def test_doctor_says_which_pythons_have_an_aligner(
     python: tuple[int, int], fix: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pocketsphinx", None)
-    monkeypatch.setattr("realizer.speech.align.sphinx.sys", SimpleNamespace(version_info=python))
+    monkeypatch.setattr("realizer_studio.align.sphinx.sys", SimpleNamespace(version_info=python))
     monkeypatch.setattr("realizer.render.drawing_process.available_backend", lambda: ("gl", None))
     (line,) = (line for line in run("doctor").stdout.splitlines() if line.split()[1] == "align")
     assert line.startswith("missing")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from realizer.speech.align import features as f
-from realizer.speech.align.alignment import AlignError
-from realizer.speech.align.features import mono, to_aligner
+from realizer_studio.align import features as f
+from realizer_studio.align.alignment import AlignError
+from realizer_studio.align.features import mono, to_aligner
 
 TONE = np.sin(np.arange(8000) * 0.1)
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from realizer.core.array_types import Bool, Float32, Float64, Index
-from realizer.speech.align import features as f
-from realizer.speech.align.alignment import Alignment, moved, probability
-from realizer.speech.align.dtw import Observed, States, best_path, quiet, usual
 from realizer.speech.utterance import Utterance
+from realizer_studio.align import features as f
+from realizer_studio.align.alignment import Alignment, moved, probability
+from realizer_studio.align.dtw import Observed, States, best_path, quiet, usual
 
 COARSE, FINE = 320, 80  # samples between frames: 20 and 5 ms
 COARSE_REACH, FINE_REACH = 30.0, 0.4  # s on each side of the diagonal, and of the coarse path

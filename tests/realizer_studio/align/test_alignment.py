@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.speech.align.alignment import MIN_PAUSE, Alignment, build, moved, probability
 from realizer.speech.utterance import Phoneme, Utterance, Word
+from realizer_studio.align.alignment import MIN_PAUSE, Alignment, build, moved, probability
 
 SECONDS = st.floats(-1.0, 4.0)
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from realizer.speech.align.features import mono, to_aligner
-from realizer.speech.align.sphinx import align_words, install_hint, model_align, to_arpabet, to_ipa
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest
-from tests.realizer.speech.align.conftest import TEXT, WRONG, Noisy
+from realizer_studio.align.features import mono, to_aligner
+from realizer_studio.align.sphinx import align_words, install_hint, model_align, to_arpabet, to_ipa
+from tests.realizer_studio.align.conftest import TEXT, WRONG, Noisy
 
 pytestmark = [
     pytest.mark.espeak,

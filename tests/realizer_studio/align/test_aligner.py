@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import RealizerError
-from realizer.speech.align.aligner import (
+from realizer.speech.duration_fit import speak_to_length
+from realizer.speech.silent import SilentVoice
+from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest
+from realizer_studio.align.aligner import (
     INSTALL,
     align,
     align_recording,
     uniform_align,
 )
-from realizer.speech.align.alignment import AlignError, Alignment
-from realizer.speech.align.sphinx import install_hint
-from realizer.speech.duration_fit import speak_to_length
-from realizer.speech.silent import SilentVoice
-from realizer.speech.utterance import MAX_TEXT, Recording, SpeechRequest
-from tests.realizer.speech.align.conftest import TEXT, WRONG
+from realizer_studio.align.alignment import AlignError, Alignment
+from realizer_studio.align.sphinx import install_hint
+from tests.realizer_studio.align.conftest import TEXT, WRONG
 
 AFTER = "how quietly they came"
 
@@ -103,7 +103,7 @@ def test_align_uses_espeak_for_other_languages(zin) -> None:
 
 
 def test_align_spreads_words_without_an_aligner(monkeypatch) -> None:
-    from realizer.speech.align import aligner, sphinx
+    from realizer_studio.align import aligner, sphinx
 
     monkeypatch.setattr(aligner, "reference_voice", SilentVoice)
     monkeypatch.setattr(sphinx, "install_hint", lambda: "not here")

@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from realizer.core.array_types import Float32, Float64
 from realizer.core.errors import RealizerError
-from realizer.speech.align import features, sphinx
-from realizer.speech.align.alignment import AlignError, Alignment, moved
-from realizer.speech.align.dtw_align import dtw_align
-from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.letter_to_sound import subtag
 from realizer.speech.registry import reference_voice
 from realizer.speech.utterance import Recording, SpeechRequest, Utterance, Voice
+from realizer_studio.align import features, sphinx
+from realizer_studio.align.alignment import AlignError, Alignment, moved
+from realizer_studio.align.dtw_align import dtw_align
+from realizer_studio.align.features import mono, to_aligner
 
 Aligner = Literal["pocketsphinx", "espeak"]
 
@@ -153,3 +153,20 @@ def align_recording(request: SpeechRequest, recording: Recording) -> Utterance:
     # last counts, so that a mark before a word is at the start of that word.
     marks = {name: float(np.interp(time, was, now)) for name, time in reference.marks.items()}
     return Utterance(len(pcm) / rate, found.words, found.phonemes, marks, rate, pcm, found.warnings)
+
+
+class RecordingAligner:
+    """The entry point `realizer.aligners`: `align_recording`, and what is missing for it."""
+
+    description = "pocketsphinx finds words in recordings of English"
+
+    def missing(self) -> str | None:
+        """Return what to install for pocketsphinx, or None."""
+        return sphinx.install_hint()
+
+    def __call__(self, request: SpeechRequest, recording: Recording, /) -> Utterance:
+        """Return a recording as an utterance with the words of its text, as `align_recording` does."""
+        return align_recording(request, recording)
+
+
+ALIGNER = RecordingAligner()

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from realizer.speech.align.alignment import Alignment
-from realizer.speech.align.dtw import States
-from realizer.speech.align.dtw_align import _adaptation, dtw_align
-from realizer.speech.align.features import mono, to_aligner
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
-from tests.realizer.speech.align.conftest import TEXT, WRONG, Noisy
+from realizer_studio.align.alignment import Alignment
+from realizer_studio.align.dtw import States
+from realizer_studio.align.dtw_align import _adaptation, dtw_align
+from realizer_studio.align.features import mono, to_aligner
+from tests.realizer_studio.align.conftest import TEXT, WRONG, Noisy
 
 pytestmark = pytest.mark.espeak
 

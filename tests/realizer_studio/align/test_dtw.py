@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realizer.speech.align.dtw import Observed, States, best_path, distance, quiet, usual
+from realizer_studio.align.dtw import Observed, States, best_path, distance, quiet, usual
 
 LETTERS = np.eye(5) * 2
 

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from realizer.core.array_types import Bool, Float32, Float64
-from realizer.speech.align.alignment import AlignError
 from realizer.speech.sound_visemes.mel_stream import RATE as RATE
 from realizer.speech.sound_visemes.mel_stream import SPECTRUM, WINDOW, mel_triangles
 from realizer.speech.utterance import RATES
+from realizer_studio.align.alignment import AlignError
 
 BANDS, LOWEST, HIGHEST = 26, 100.0, 7000.0  # of the mel scale, Hz
 KEPT = 13  # cepstra; higher ones depend on the pitch

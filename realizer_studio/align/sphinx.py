@@ -12,9 +12,9 @@ import numpy as np
 
 from realizer import tables
 from realizer.core.array_types import Float32
-from realizer.speech.align import sphinx
-from realizer.speech.align.alignment import Alignment, build, probability
 from realizer.speech.utterance import Phoneme, Utterance
+from realizer_studio.align import sphinx
+from realizer_studio.align.alignment import Alignment, build, probability
 
 INSTALL = "no aligner of English: pip install 'bml-realizer[align]'"
 NO_WHEEL = (

@@ -7,6 +7,9 @@ import pytest
 
 from realizer.speech.espeak.voice import EspeakVoice
 from realizer.speech.utterance import SpeechRequest, Utterance
+from tests.realizer.speech.conftest import _skip_without_the_engine, voice
+
+__all__ = ["_skip_without_the_engine", "voice"]
 
 TEXT = "The tall woman carried a basket of apples down the hill."
 WRONG = "Yesterday it rained all day; today the sun is shining."
