@@ -23,6 +23,13 @@ LABEL = re.compile(r"\[(\^?)[^\]\n]+\]:")  # of a footnote, or of an address
 FENCE = re.compile(r"```|~~~")
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LONGEST_DIRECTION = 60  # characters
+# Most text with signs is of these kinds, for which no parser is needed: text without markup, emphasis or a
+# link around all of the words, and markup of which only the beginning is there.
+NO_MARKUP = re.compile(r"[^*_~`\[\]<\\&\r\n]*")
+_WITHIN = r"[^*_~`\[\]()<\\&!\r\n]"
+EMPHASIS = re.compile(rf"(\*\*?)([^\W_](?:{_WITHIN}*[^\W_])?[.!?]?)\1([.,!?:;]*[^\S\r\n])")
+LINK = re.compile(rf"\[({_WITHIN}+)\]\(https?://[\w./?=#-]+\)([.,!?:;]*[^\S\r\n])")
+BEGUN_MARKUP = re.compile(rf"(?:\*\*?(?=\w)|\[){_WITHIN}*")
 OPEN_BRACKET = re.compile(rf"\([^()]{{0,{LONGEST_DIRECTION}}}$")
 
 
@@ -54,6 +61,7 @@ def _parser() -> MarkdownIt:
     # Lines below a heading are read one by one, references have no words, and text is often indented.
     parser.disable(["code", "lheading", "reference", "html_block"])
     parser.inline.ruler.before("autolink", "tag", _tag)
+    parser.normalizeLink = str  # type: ignore[method-assign, assignment]  # no one says an address
     return parser
 
 
@@ -115,6 +123,11 @@ def cells(row: str) -> list[str]:
 
 def read_inline(text: str) -> tuple[list[Piece], bool]:
     """Return the pieces of a text without line starts, and whether markup that begins in it is still open."""
+    return read_plain(text) or parse_inline(text)
+
+
+def parse_inline(text: str) -> tuple[list[Piece], bool]:
+    """Return what `read_inline` gives, by the parser."""
     tokens: list[Token] = []
     parser = _parser()
     state = StateInline(text, parser, {}, tokens)
@@ -126,6 +139,19 @@ def read_inline(text: str) -> tuple[list[Piece], bool]:
     is_open = is_open or "`" in literal or literal.count("[") > literal.count("]")
     is_open = is_open or bool(BEGUN.search(literal)) or bool(OPEN_BRACKET.search(literal))
     return _pieces(tokens), is_open
+
+
+def read_plain(text: str) -> tuple[list[Piece], bool] | None:
+    """Return what `read_inline` gives for markup of the simplest kinds, or None; the parser is slow."""
+    if NO_MARKUP.fullmatch(text):
+        return [Piece("text", text)], bool(OPEN_BRACKET.search(text))
+    if BEGUN_MARKUP.fullmatch(text):
+        return [Piece("text", text)], True
+    if found := EMPHASIS.fullmatch(text):
+        return [Piece("em" if found[1] == "*" else "text", found[2]), Piece("text", found[3])], False
+    if found := LINK.fullmatch(text):
+        return [Piece("text", found[1]), Piece("text", found[2])], False
+    return None
 
 
 def _pieces(tokens: Sequence[Token]) -> list[Piece]:

@@ -1,8 +1,8 @@
 """Numbers and signs in words: money, dates, times, units, versions, Roman numbers, by `text_numbers.toml`."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from realizer.tables import toml_table
@@ -25,16 +25,41 @@ _VALUES = {"I": 1, "V": 5, "X": 10, "L": 50}
 _FRACTIONS = {"½": "1/2", "¼": "1/4", "¾": "3/4", "⅓": "1/3", "⅔": "2/3", "⅛": "1/8"}
 _SLOT = re.compile(r"\{(\w+)(?::(\w+))?\}")
 _OPTION = re.compile(r"\[([^\[\]]*)\]")
-_WORD = re.compile(r"\S+\s+")
+_WORD = re.compile(r"(?<!\S)\S+\s+")  # the first condition makes long words take linear time
 _GROUP = re.compile(r"\(\?<(?![!=])")  # as JavaScript writes it
 _DIGIT_ONLY = re.compile(r"[^0-9]")
+# Parts of a pattern of the table: sets of signs, groups without groups in them, and what is no sign.
+_SETS = re.compile(r"\[([^\]]+)\]")
+_GROUPS = re.compile(r"\((\?(?:[:=!]|<[=!]|<\w+>))?((?:[^()\\]|\\.)*)\)([?*]?)")
+_NO_SIGN = re.compile(r"(?:\\.|[^\\])[?*]|\{\w*,?\w*\}[?*]?| |(?<!\\)\+")
+_RANGE = re.compile(r"^\^|.-.|\\")
+_AT_NUMBER = re.compile(
+    r"\{B\}(?:\(\?!\{NUM\}\{E\}\))?(?:\(\?<\w+>|\(\?:)?(?:[0-9]|\[[0-9]|\{(?:NUM|SIGNED|T|Y)\})"
+)
+_NUMBER_BEGINS = re.compile(r"(?<![\w.,:/])[-−0-9]")
+_ROMAN_ENDS = re.compile("[IVXL](?![a-df-z])")
+_ROMAN_SIGN = "\ufdd0"  # stands for a Roman number
+_PRIVATE = 0xE000  # the first character without a meaning
 
 
 class Frame(NamedTuple):
-    """A pattern of a number with its surroundings, such as a date, and the words for what it matches."""
+    """A pattern of a number with its surroundings, such as a date, and the words for what it matches.
+
+    Attributes:
+        needs: sets of signs; a text in which the pattern is found has one of each.
+        at_number: whether it is only found where a number begins.
+    """
 
     pattern: re.Pattern[str]
     words: str
+    needs: tuple[str, ...]
+    at_number: bool
+
+    def is_in(self, text: str, numbers: Sequence[int]) -> bool:
+        """Return whether the pattern is found in a text whose numbers begin at these places."""
+        if self.at_number:
+            return any(self.pattern.match(text, at) for at in numbers)
+        return self.pattern.search(text) is not None
 
 
 def language_of(tag: str) -> str | None:
@@ -93,14 +118,39 @@ def complete(text: str, tag: str, before: str = "") -> int:
 def _applied(text: str, language: str) -> str:
     """Return a text with all frames applied, around its numbers only: few texts have many."""
     said, at = "", 0
+    frames = _frames(language)
     for begin, end in _windows(text):
         said += text[at:begin]
         piece, at = text[begin:end], end
-        for frame in _frames(language):
-            if frame.pattern.search(piece):
+        possible, numbers = _possible(language, _signs(piece, language)), _beginnings(piece)
+        for place, frame in enumerate(frames):
+            if possible[place] and frame.is_in(piece, numbers):
                 piece = frame.pattern.sub(_filler(frame, language), piece)
+                possible = _possible(language, _signs(piece, language))
+                numbers = _beginnings(piece)
         said += piece
     return said + text[at:]
+
+
+def _beginnings(text: str) -> list[int]:
+    return [found.start() for found in _NUMBER_BEGINS.finditer(text)]
+
+
+def _signs(text: str, language: str) -> frozenset[str]:
+    """Return the signs of a text of which the frames of a language need some."""
+    signs = _needed(language).intersection(text)
+    return signs | {_ROMAN_SIGN} if _ROMAN_ENDS.search(text) else signs
+
+
+@cache
+def _needed(language: str) -> frozenset[str]:
+    return frozenset(sign for frame in _frames(language) for need in frame.needs for sign in need)
+
+
+@lru_cache(maxsize=1000)
+def _possible(language: str, signs: frozenset[str]) -> tuple[bool, ...]:
+    """Return for each frame whether a text with these signs may have it."""
+    return tuple(not any(signs.isdisjoint(need) for need in frame.needs) for frame in _frames(language))
 
 
 def _windows(text: str) -> Iterator[tuple[int, int]]:
@@ -124,17 +174,24 @@ def _filler(frame: Frame, language: str) -> Callable[[re.Match[str]], str]:
         if not _is_possible(groups, language):
             return found[0]
 
-        def optional(option: re.Match[str]) -> str:
-            return option[1] if all(slot[1] in groups for slot in _SLOT.finditer(option[1])) else ""
-
-        def word(slot: re.Match[str]) -> str:
-            return (
-                _money(groups, language) if slot[1] == "money" else _said(slot[1], slot[2], groups, language)
-            )
-
-        return _SLOT.sub(word, _OPTION.sub(optional, frame.words))
+        parts = _slots(frame.words, frozenset(groups))
+        said = parts[0]
+        for name, kind, after in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
+            said += _money(groups, language) if name == "money" else _said(name, kind, groups, language)
+            said += after
+        return said
 
     return fill
+
+
+@lru_cache(maxsize=1000)
+def _slots(words: str, groups: frozenset[str]) -> list[str]:
+    """Return the words of a frame for these groups: text, then name, kind and text behind of each slot."""
+
+    def optional(option: re.Match[str]) -> str:
+        return option[1] if all(slot[1] in groups for slot in _SLOT.finditer(option[1])) else ""
+
+    return _SLOT.split(_OPTION.sub(optional, words))
 
 
 def _is_possible(groups: Mapping[str, str], language: str) -> bool:
@@ -284,7 +341,44 @@ def _frames(language: str) -> tuple[Frame, ...]:
     frames = []
     at = row["frames"].index(["shared", ""])
     for pattern, words in [*row["frames"][:at], *shared["frames"], *row["frames"][at + 1 :]]:
+        needs, at_number = _needs(pattern), _AT_NUMBER.match(pattern) is not None
         for name, macro in macros.items():
             pattern = pattern.replace(f"{{{name}}}", macro)
-        frames.append(Frame(re.compile(_GROUP.sub("(?P<", pattern)), words))
+        frames.append(Frame(re.compile(_GROUP.sub("(?P<", pattern)), words, needs, at_number))
     return tuple(frames)
+
+
+def _needs(pattern: str) -> tuple[str, ...]:
+    """Return sets of signs of which a text has one each if a pattern of the table is found in it."""
+    sets: list[str] = []
+
+    def of_set(found: re.Match[str]) -> str:
+        if _RANGE.search(found[1]):
+            return "{}"
+        sets.append(found[1])
+        return chr(_PRIVATE + len(sets) - 1)
+
+    def of_group(found: re.Match[str]) -> str:
+        is_free = found[3] or "|" in found[2] or found[1] in ("?=", "?!", "?<=", "?<!")
+        return "{}" if is_free else found[2]
+
+    pattern = pattern.replace("{ROMAN}", _ROMAN_SIGN).replace("[IVXL]{2,}", _ROMAN_SIGN)
+    rest, count = _SETS.sub(of_set, pattern.replace("{FRACTION}", "/")), 1
+    while count:
+        rest, count = _GROUPS.subn(of_group, rest)
+    choices = [
+        [
+            sets[ord(sign) - _PRIVATE] if _PRIVATE <= ord(sign) < ord(_ROMAN_SIGN) else sign
+            for sign in signs
+            if not _is_letter(sign)
+        ]
+        for signs in _NO_SIGN.sub("", rest).replace("\\", "").split("|")
+    ]
+    if len(choices) == 1:
+        return tuple(need for need in choices[0] if not any(map(_is_letter, need)))
+    return ("".join(needs[0] for needs in choices),) if all(choices) else ()
+
+
+def _is_letter(sign: str) -> bool:
+    """Return whether most texts have a sign, so that to look for it saves nothing."""
+    return sign.isalpha() or sign.isdecimal()

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from realizer.tables import toml_table
@@ -25,6 +25,7 @@ def languages() -> tuple[str, ...]:
     return tuple(toml_table(FILE))
 
 
+@lru_cache(maxsize=10_000)
 def spelled(number: int, language: str, kind: str = "cardinal") -> str:
     """Return a number in words, such as "twenty-first"; in digits if it is too large for the rules.
 

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from realizer.text.markdown import (
     BEGINNING,
@@ -57,6 +57,20 @@ UNSAID = re.compile(r"(?<!\S)\|(?!\S)|[→⇒➜]|(?<!\S)(?:-{1,2}|=)>(?!\S)|#(?
 NAME = re.compile(r"</?([\w-]+)(:?)")
 
 
+class Tried(NamedTuple):
+    """How far words were read in which markup is open, so that they are not read again for each new line.
+
+    Attributes:
+        length: number of characters.
+        ends: number of ends that were found in them.
+        checked: the number of the last end up to which they were parsed.
+    """
+
+    length: int = 0
+    ends: int = 0
+    checked: int = 0
+
+
 class TextStream:
     """A reader of text in pieces of any size; what it returns together is what the whole text gives.
 
@@ -80,6 +94,7 @@ class TextStream:
         self._code = code
         self._source = ""  # not read
         self._open = ""  # words of a paragraph in which markup may be open
+        self._tried = Tried()
         self._before = ""  # the last words of the paragraph
         self._unsaid = ""  # words with numbers that may go on
         self._said = ""  # the last words that were returned
@@ -236,10 +251,12 @@ class TextStream:
                 at = begin
             if special is None:
                 break
-            segment = _segment(text, at, closed=closed)
-            if segment is None:
+            segment = _segment(text, at, self._tried, closed=closed)
+            if isinstance(segment, Tried):
+                self._tried = segment
                 break
             at, pieces = segment
+            self._tried = Tried()
             found += self._spoken(pieces)
         self._open = text[at:]
         return found
@@ -304,20 +321,20 @@ class TextStream:
         yield _without_signs(text[at:])
 
 
-def _segment(text: str, begin: int, *, closed: bool) -> tuple[int, list[Piece]] | None:
-    """Return the end of words whose markup is complete, and their pieces; None if more may belong to them."""
-    at, count, checked = begin, 0, 0
+def _segment(text: str, begin: int, tried: Tried, *, closed: bool) -> tuple[int, list[Piece]] | Tried:
+    """Return the end of words whose markup is complete, and their pieces; else how far they were tried."""
     most = begin + MAX_HELD
     brackets = [found.start() for found in islice(BRACKET.finditer(text, begin, most), MAX_BRACKETS)]
     most = brackets[-1] + 1 if len(brackets) == MAX_BRACKETS else most
     while True:
+        at = begin + tried.length
         special = SPECIAL.search(text, at, most)
         if special is None and len(text) <= most and not closed:
-            return None
+            return tried
         end = _first_blank(text, most if special is None else special.end(), most, closed=closed)
         if end is None:
-            return None
-        count += 1
+            return tried
+        count, checked = tried.ends + 1, tried.checked
         is_last = end >= most or (closed and end == len(text))
         if count > checked * 1.4 or is_last:
             checked = count
@@ -325,11 +342,11 @@ def _segment(text: str, begin: int, *, closed: bool) -> tuple[int, list[Piece]] 
             if not (is_open or is_last) and _wants_next(pieces):
                 end = _first_blank(text, end, most, closed=closed)
                 if end is None:
-                    return None
+                    return tried
                 pieces, is_open = read_inline(text[begin:end])
             if not is_open or is_last:
                 return end, pieces
-        at = end
+        tried = Tried(end - begin, count, checked)
 
 
 def _wants_next(pieces: Sequence[Piece]) -> bool:

@@ -1,6 +1,17 @@
 """Tests of the markup of Markdown."""
 
-from realizer.text.markdown import cells, fence_end, has_words, line_start, read_inline
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from realizer.text.markdown import (
+    cells,
+    fence_end,
+    has_words,
+    line_start,
+    parse_inline,
+    read_inline,
+    read_plain,
+)
 from tests.rows import each_row
 
 
@@ -73,3 +84,16 @@ def test_cells_of_a_row(row: str, texts: list[str]) -> None:
 )
 def test_markup_is_open_until_it_ends(text: str, is_open: bool) -> None:
     assert read_inline(text)[1] is is_open
+
+
+FORMS = ("{}", "**{}** ", "*{}*. ", "*{}", "**{}", "[{}", "[{}](https://x.org/a?b=c_d). ")
+
+
+@given(st.sampled_from(FORMS), st.text("ab *_[]()!.,?;:'’-~`<>\\& \té1²V😀", max_size=9))
+@example("**{}** ", "Sure!")
+@example("[{}](https://x.org/a?b=c_d). ", "our page")
+def test_simple_markup_is_read_as_by_the_parser(form: str, words: str) -> None:
+    text = form.format(words)
+    if (plain := read_plain(text)) is not None:
+        pieces, is_open = parse_inline(text)
+        assert plain == ([piece for piece in pieces if piece.text] if text else plain[0], is_open)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from realizer.core.toml_text import parse_toml
+from realizer.text import numbers
 from realizer.text.numbers import complete, language_of, numbers_in_words, roman
 from tests.rows import each_row
 
@@ -17,6 +18,19 @@ ROWS = [
 @each_row("language, text, words", ROWS)
 def test_numbers_are_what_people_say(language: str, text: str, words: str) -> None:
     assert numbers_in_words(text, language) == words
+
+
+@each_row("language", ["en", "de", "fr", "es", "nl"])
+def test_no_frame_is_passed_over_that_is_found(language: str) -> None:
+    found = 0
+    for _, text, _ in ROWS:
+        possible = numbers._possible(language, numbers._signs(text, language))
+        for is_possible, frame in zip(possible, numbers._frames(language), strict=True):
+            if frame.pattern.search(text):
+                found += 1
+                assert is_possible, (frame, text)
+                assert frame.is_in(text, numbers._beginnings(text)), (frame, text)
+    assert found > 100
 
 
 def test_each_language_has_enough_rows() -> None:
