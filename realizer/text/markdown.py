@@ -107,6 +107,8 @@ def fence_end(line: str) -> re.Pattern[str] | None:
 
 def has_words(line: str) -> bool:
     """Return whether a line of signs and numbers is more than markup, such as "2024"."""
+    if not any(map(str.isalnum, line)):
+        return False
     content = [token.content for token in _parser().parse(line) if token.type == "inline"]
     return any(any(map(str.isalnum, text)) for text in content)
 

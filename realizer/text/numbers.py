@@ -15,10 +15,16 @@ MAX_HELD = 400  # characters; of numbers that go on for longer, only the last pa
 FEW = 3  # words after a number that may belong to it
 ROMAN = r"(?:(?=[IVXL])(?:XL|L?X{0,3})(?:IX|IV|V?I{0,3}))"
 _SIGNS = "$€£¥₹¢%‰°#§½¼¾⅓⅔⅛*×·÷=<>≤≥≈~±№℃"
-# Signs of a number or of a word that belongs to one; text without these stays as it is.
+_DIRECT = rf"[0-9{re.escape(_SIGNS)}]"
+_NUMERAL = (
+    r"\b(?:(?:[VXL]|[IVXL]{2,})(?:e|ème)?\b|Ier\b|(?:War|[Cc]hapter|[Pp]art|[Vv]olume|[Aa]ct|[Ss]cene|Elizabeth"
+    r"|Charles|James|Francis|Kapitel) I\b)"
+)
+# Signs of a number or of a word that belongs to one; text without these stays as it is. The first
+# characters of all of them come first, and the conditions behind them: so the search leaps.
 BUSY = re.compile(
-    rf"[0-9{re.escape(_SIGNS)}]|\b(?:[VXL]|[IVXL]{{2,}})(?:e|ème)?\b|\bIer\b"
-    r"|\b(?:War|[Cc]hapter|[Pp]art|[Vv]olume|[Aa]ct|[Ss]cene|Elizabeth|Charles|James|Francis|Kapitel) I\b"
+    rf"[IVXLWCcPpvAaSsEJFK{_DIRECT[1:-1]}](?:(?<={_DIRECT})"
+    rf"|(?<=(?={_NUMERAL}).)(?:[IVXL]*(?:e|ème)?|er|[a-z]+ I)\b)"
 )
 STARS = re.compile(r"\*")
 _VALUES = {"I": 1, "V": 5, "X": 10, "L": 50}
@@ -57,9 +63,13 @@ class Frame(NamedTuple):
 
     def is_in(self, text: str, numbers: Sequence[int]) -> bool:
         """Return whether the pattern is found in a text whose numbers begin at these places."""
-        if self.at_number:
-            return any(self.pattern.match(text, at) for at in numbers)
-        return self.pattern.search(text) is not None
+        if not self.at_number:
+            return self.pattern.search(text) is not None
+        match = self.pattern.match
+        for at in numbers:  # noqa: SIM110  (twice as fast as `any`, and short texts have few numbers)
+            if match(text, at):
+                return True
+        return False
 
 
 def language_of(tag: str) -> str | None:
