@@ -23,12 +23,13 @@ LABEL = re.compile(r"\[(\^?)[^\]\n]+\]:")  # of a footnote, or of an address
 FENCE = re.compile(r"```|~~~")
 COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 LONGEST_DIRECTION = 60  # characters
-# Most text with signs is of these kinds, for which no parser is needed: text without markup, emphasis or a
-# link around all of the words, and markup of which only the beginning is there.
+# Most text with signs is of these kinds, for which no parser is needed: text without markup, emphasis,
+# code or a link around all of the words, and markup of which only the beginning is there.
 NO_MARKUP = re.compile(r"[^*_~`\[\]<\\&\r\n]*")
 _WITHIN = r"[^*_~`\[\]()<\\&!\r\n]"
 EMPHASIS = re.compile(rf"(\*\*?)([^\W_](?:{_WITHIN}*[^\W_])?[.!?]?)\1([.,!?:;]*[^\S\r\n])")
 LINK = re.compile(rf"\[({_WITHIN}+)\]\(https?://[\w./?=#-]+\)([.,!?:;]*[^\S\r\n])")
+CODE = re.compile(r"`([^\s`](?:[^`\r\n]*[^\s`])?)`([.,!?:;]*[^\S\r\n])")
 BEGUN_MARKUP = re.compile(rf"(?:\*\*?(?=\w)|\[){_WITHIN}*")
 OPEN_BRACKET = re.compile(rf"\([^()]{{0,{LONGEST_DIRECTION}}}$")
 
@@ -151,6 +152,8 @@ def read_plain(text: str) -> tuple[list[Piece], bool] | None:
         return [Piece("text", text)], True
     if found := EMPHASIS.fullmatch(text):
         return [Piece("em" if found[1] == "*" else "text", found[2]), Piece("text", found[3])], False
+    if found := CODE.fullmatch(text):
+        return [Piece("code", found[1]), Piece("text", found[2])], False
     if found := LINK.fullmatch(text):
         return [Piece("text", found[1]), Piece("text", found[2])], False
     return None

@@ -86,7 +86,7 @@ def test_markup_is_open_until_it_ends(text: str, is_open: bool) -> None:
     assert read_inline(text)[1] is is_open
 
 
-FORMS = ("{}", "**{}** ", "*{}*. ", "*{}", "**{}", "[{}", "[{}](https://x.org/a?b=c_d). ")
+FORMS = ("{}", "`{}`, ", "**{}** ", "*{}*. ", "*{}", "**{}", "[{}", "[{}](https://x.org/a?b=c_d). ")
 
 
 @given(st.sampled_from(FORMS), st.text("ab *_[]()!.,?;:'’-~`<>\\& \té1²V😀", max_size=9))
