@@ -192,8 +192,6 @@ def test_check_marks_an_unknown_target(tmp_path: Path) -> None:
 BROKEN = {
     "mismatch": ("<head>\n</hed></bml>", ["</hed", "head"]),
     "quotes": ("<head id=n/></bml>", ["n/"]),
-    "entity": ("<speech id='s'><text>a&nbsp;b</text></speech></bml>", ["&nbsp;"]),
-    "ampersand": ("<speech id='s'><text>a & b</text></speech></bml>", ["&"]),
     "twice": ("<head id='a' id='b'/></bml>", ["id", "a"]),
     "open": ("<speech id='s'>", [">", "speech"]),
 }
@@ -206,6 +204,14 @@ def test_check_marks_where_xml_is_broken(case: str, tmp_path: Path) -> None:
     (block,) = blocks(done)
     assert "not well-formed" in block[0]
     assert sorted(marked(block)) == sorted(under)
+
+
+@pytest.mark.parametrize("signs", ["a&nbsp;b", "a & b"])
+def test_check_says_which_signs_of_a_text_are_read_as_text(signs: str, tmp_path: Path) -> None:
+    done = check(tmp_path, f"{HEAD}<speech id='s'><text>{signs}</text></speech></bml>", "--long")
+    (block,) = blocks(done)
+    assert "read as text" in block[0]
+    assert signs in block[0]
 
 
 def test_check_distinguishes_several_documents_of_a_file(tmp_path: Path) -> None:
@@ -237,11 +243,10 @@ def test_check_cuts_a_very_long_line_around_the_fault(tmp_path: Path) -> None:
     assert "..." in block[2]
 
 
-def test_check_marks_bytes_that_are_not_text(tmp_path: Path) -> None:
+def test_check_says_how_bytes_that_are_not_utf_8_are_read(tmp_path: Path) -> None:
     done = check(tmp_path, b'<bml id="b">\n<wait id="\xff"/></bml>', "--long")
     (block,) = blocks(done)
-    assert "0xFF" in block[0]
-    assert marked(block) == ["\N{REPLACEMENT CHARACTER}"]
+    assert "read as Windows-1252, as it is not UTF-8" in block[0]
 
 
 ADVICE = {

@@ -118,7 +118,7 @@ def test_speech_closed_with_its_connection_refuses_text_of_the_next_one() -> Non
         async with connect(f"{url}?session=show") as client:
             lost = client.speech("s1")
             speech = await lost.__aenter__()
-            await speech.append("One two three four five six seven eight nine ten. ")
+            await speech.append("One two three four five six seven eight nine ten. " * 9)
             await client.ask("ping")
             await client.close()  # while appended text waits a moment for more
             with pytest.raises(ClientError, match="the connection has ended"):

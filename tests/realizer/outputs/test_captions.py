@@ -50,7 +50,8 @@ def test_captions_have_the_punctuation_of_the_text_and_end_at_sentences():
         "Hello there.",
         "How are you?",
         'He said, "It is Dr.',
-        "Smith \u2013 not 50% \u2013 of all 'em!\"",
+        "Smith \u2013 not fifty percent",
+        "of all 'em!\"",
         "(Yes.)",
         "你好，世界。",
     ]

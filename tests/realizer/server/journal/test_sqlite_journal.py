@@ -49,15 +49,19 @@ def test_sqlite_journal_reads_a_file_of_version_1(tmp_path: Path) -> None:
     )
 
 
-def test_sqlite_journal_names_a_line_that_is_no_entry(tmp_path: Path) -> None:
+def test_sqlite_journal_sets_aside_a_line_that_is_no_entry(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     path = tmp_path / "journal.db"
     journal = journal_at(str(path))
     journal.begin("s", 0.0)
     journal.add("s", FIRST)
     with sqlite3.connect(path) as file:
         file.execute("INSERT INTO entries (session, line) VALUES ('s', 'BML')")
-    with pytest.raises(JournalError, match="the journal:2: wanted an entry of a journal, got 'BML'"):
-        journal.claim("s")
+    saved = journal.claim("s")
+    assert saved is not None
+    assert [entry.kind for entry in saved.entries] == [FIRST.kind, "tick"]
+    assert "wanted an entry of a journal, got 'BML'" in caplog.text
 
 
 def test_sqlite_journal_is_unchanged_by_a_checkpoint_that_fails(tmp_path: Path) -> None:
