@@ -30,7 +30,7 @@ _WITHIN = r"[^*_~`\[\]()<\\&!\r\n]"
 EMPHASIS = re.compile(rf"(\*\*?)([^\W_](?:{_WITHIN}*[^\W_])?[.!?]?)\1([.,!?:;]*[^\S\r\n])")
 LINK = re.compile(rf"\[({_WITHIN}+)\]\(https?://[\w./?=#-]+\)([.,!?:;]*[^\S\r\n])")
 CODE = re.compile(r"`([^\s`](?:[^`\r\n]*[^\s`])?)`([.,!?:;]*[^\S\r\n])")
-BEGUN_MARKUP = re.compile(rf"(?:\*\*?(?=\w)|\[){_WITHIN}*")
+BEGUN_MARKUP = re.compile(rf"\*\*?(?=\w){_WITHIN}*|(?=[^\[]*\[)[^*_~`\]<\\&\r\n]*")
 OPEN_BRACKET = re.compile(rf"\([^()]{{0,{LONGEST_DIRECTION}}}$")
 
 
