@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from bml_schema import CORE, BMLError, Speech, read, write
+from bml_schema import CORE, BMLError, Speech, SpeechText, read, write
 from bml_schema.nodes import BMLT
 from bml_schema.reading.element_reader import Vocabulary
 from bml_schema.reading.encodings import decode, without_controls
@@ -35,6 +35,7 @@ _PIECE = re.compile(
 # What begins a document: an element that is neither SSML nor HTML inside of a text, or <bml> anywhere.
 _BEGINNING = re.compile(r"[\s\ufeff]*<(?:[?!]|(?:[\w.-]+:)?([A-Za-z_][\w.-]*)(?=[\s/>]|$))")
 _DOCUMENT = re.compile(r"<(?:[\w.-]+:)?(?:bml|speak|act|fml-apml)(?=[\s/>]|$)")
+NOTHING_SPOKEN = "nothing in the text can be spoken"
 NOTHING = BMLError("wanted <bml>, or a text to speak, got nothing", line=1)
 WANTED = "BML, a text, bytes, a pathlib.Path, or a list of these"
 
@@ -120,15 +121,23 @@ def spoken(text: str, number: int = 1, *, language: str = "en", plain: bool = Fa
     text, controls = without_controls(text)
     said = SpokenText(text) if plain else spoken_text(text, language)
     warnings = "; ".join(filter(None, (controls, *said.warnings)))
+    pieces = _divided((text,) if plain else said.parts)
+    blocks = [text_block(markup(parts), Chunk("speech", number)) for parts in pieces]
+    if not any(block.behaviours or block.problems for block in blocks):
+        warnings = warnings or NOTHING_SPOKEN
     documents = []
-    for k, parts in enumerate(_divided((text,) if plain else said.parts)):
-        block = text_block(markup(parts), Chunk("speech", number))
-        unsaid = "; ".join([warnings] * (warnings != "" and not k) + [fault.text for fault in block.problems])
-        remark = {UNSAID: unsaid} if unsaid else {}
-        children = tuple(
-            replace(node, unknown_attributes=remark) if isinstance(node, Speech) else node
-            for node in block.children
-        )
+    for k, block in enumerate(blocks):
+        remarks = [*([warnings] if warnings and not k else ()), *(fault.text for fault in block.problems)]
+        children = block.children
+        if remarks:
+            remark = {UNSAID: "; ".join(remarks)}
+            if not any(isinstance(node, Speech) for node in children):
+                # A speech without words carries what is left out.
+                children = (Speech(id="speech", text=SpeechText()), *children)
+            children = tuple(
+                replace(node, unknown_attributes=remark) if isinstance(node, Speech) else node
+                for node in children
+            )
         id = f"text{number}-{k + 1}" if k else f"text{number}"
         documents.append(write(replace(block, id=id, composition="APPEND", children=children)))
     return "".join(documents)

@@ -92,6 +92,27 @@ def test_realize_speaks_a_text(tmp_path: Path) -> None:
     assert realize(tmp_path / "x.bml").schedules[0].block == "b"
 
 
+@each_row(
+    "text, left_out",
+    [
+        ("```\nonly code\n```", "a block of code is not spoken"),
+        ("*clears throat*", "the stage direction 'clears throat' is not known"),
+        ("*", "nothing in the text can be spoken"),
+        ("...", "nothing in the text can be spoken"),
+    ],
+)
+def test_realize_names_what_is_left_out_of_a_text_without_words(text: str, left_out: str) -> None:
+    played = realize(text, voice="silent")
+    assert played.plays_nothing
+    assert left_out in played.warnings[0].text
+
+
+def test_realize_names_what_is_left_out_beside_a_behaviour() -> None:
+    played = realize("[nod]\n```\ncode\n```", voice="silent")
+    assert not played.plays_nothing
+    assert "a block of code is not spoken" in played.warnings[0].text
+
+
 @pytest.mark.parametrize("source", ["<bml/>", "", ["<bml id='b'><oops", "<bml/>"], b"\x89\x01\0"])
 def test_realize_refuses_a_source_without_a_document(source: str | bytes | list[str]) -> None:
     with pytest.raises(BMLError) as error:

@@ -63,6 +63,12 @@ def test_renderings_refuse_documents_of_which_nothing_plays() -> None:
     assert "/realizer-" not in said
 
 
+def test_renderings_refuse_texts_of_which_nothing_can_be_spoken() -> None:
+    status, said = refused(b"```\nonly code\n```", format="vtt")
+    assert status == HTTPStatus.UNPROCESSABLE_ENTITY
+    assert "a block of code is not spoken" in said
+
+
 def test_renderings_of_one_address_are_limited() -> None:
     async def run() -> list[object]:
         renderings = Renderings(Settings(voice="silent"))
