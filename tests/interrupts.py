@@ -38,6 +38,7 @@ def check_interrupted(
         (os.killpg if number == signal.SIGINT else os.kill)(program.pid, number)
         _, error = program.communicate(timeout=LIMIT)
     # A progress bar without a terminal is an empty line.
-    assert (program.returncode, error.strip().splitlines()) == (status, [words])
+    found = program.returncode, error.strip().splitlines()
+    assert found == (status, [words]), found
     assert not [*folder.rglob(".*.mp4*"), *folder.rglob(".*.fap")]
     assert (folder / "film.mp4").read_text() == (folder / "demo.mp4").read_text() == "before"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
 from multiprocessing import get_context
@@ -89,7 +90,8 @@ class _WorkerProcess:
         added = [name for name in SINGLE_THREAD if name not in os.environ]
         os.environ.update(dict.fromkeys(added, "1"))
         try:
-            self._process.start()
+            with _signals_held():  # one in between would leave a process that knows half of what it needs
+                self._process.start()
         finally:
             for name in added:
                 del os.environ[name]
@@ -118,6 +120,24 @@ class _WorkerProcess:
             self._process.kill()
             self._process.join()
         return self._process.exitcode
+
+
+@contextlib.contextmanager
+def _signals_held() -> Iterator[None]:
+    """Let SIGINT and SIGTERM wait until the end of the block."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread has handlers
+        return
+    came: list[int] = []
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = {number: signal.signal(number, lambda number, _: came.append(number)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 def _serve(pipe: Connection[Any, Any], options: Options) -> None:
