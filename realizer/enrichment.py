@@ -3,13 +3,14 @@
 import logging
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
 from bml_schema import Block, BMLError, Speech, read, write
 from bml_schema.escape import ILLEGAL, escape
 from realizer.behaviours.registry import VOCABULARY
+from realizer.behaviours.speech import UNSAID
 from realizer.core.options import PlayOptions
 from realizer.knowledge.enrich import Enricher, SpokenText
 from realizer.knowledge.word_languages import Words, language_of
@@ -124,12 +125,14 @@ class Enrichment:
             raise ValueError("wanted a text or a BML document, got characters XML cannot hold")
         if not plain:
             said = spoken_text(clean, enricher.words.language)
-            for warning in said.warnings:
-                report(warning)
-            if said.markup != escape(said):  # behaviours, or SSML
+            if said.markup != escape(said):  # behaviours, or SSML; its speech says what is left out
                 found._add_documents(spoken(clean, language=enricher.words.language), enricher, report)
                 return found
+            for warning in said.warnings:
+                report(warning)
             clean = said.text
+            if not clean:
+                raise ValueError("wanted a text or a BML document, got nothing that can be spoken")
         found.blocks += enricher.texts(clean, MAX_TEXT)
         found.placed = sum(map(_count_placed, found.blocks))
         found.languages = [enricher.words.language]
@@ -144,6 +147,7 @@ class Enrichment:
             if not isinstance(item, Block):
                 self.errors.append(item)
                 continue
+            item = _without_remarks(item, report)
             self.languages += languages_in(item, enricher.words)
             if enricher.role == "speaker":
                 for node in item.behaviours:
@@ -157,6 +161,20 @@ class Enrichment:
                 texts = _spoken_texts(item, enricher.words.language)
                 self.blocks.append(enricher.listener(texts, f"{item.id}-listener"))
                 self.placed += _count_placed(self.blocks[-1])
+
+
+def _without_remarks(block: Block, report: Callable[[str], None]) -> Block:
+    """Report what of a text is not in the words of its speech, and return the block without these remarks."""
+    children = []
+    for node in block.children:
+        attributes = dict(node.unknown_attributes) if isinstance(node, Speech) else {}
+        if isinstance(node, Speech) and (left_out := attributes.pop(UNSAID, "")):
+            report(left_out)
+            if node.text is not None and not node.text.parts:  # it only carries the remark
+                continue
+            node = replace(node, unknown_attributes=attributes)
+        children.append(node)
+    return replace(block, children=tuple(children))
 
 
 def languages_in(block: Block, words: Words) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 import realizer
 from bml_schema import BMLError, parse
 from bml_schema.extensions import Expression
+from realizer.behaviours.registry import VOCABULARY
 
 SPEECH = '<bml id="a"><speech id="s"><text>Really?</text></speech></bml>'
 
@@ -59,3 +60,19 @@ def test_enrich_reads_a_text_as_people_mean_it() -> None:
     assert "*" not in text
     assert 'lexeme="NOD"' in realizer.enrich("Great [nod] news!")
     assert "**" in realizer.enrich("**Great** news!", plain=True)
+
+
+@pytest.mark.parametrize("text", ["Hi <company>.", "[nod] Really?\n```\ncode\n```", "[nod]\n```\ncode\n```"])
+def test_enrich_reports_what_is_left_out_and_does_not_write_it(
+    text: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    bml = realizer.enrich(text)
+    (warning,) = caplog.messages
+    assert "<company>" in warning or "a block of code is not spoken" in warning
+    assert "unsaid" not in bml
+    assert parse(bml, VOCABULARY).problems == ()
+
+
+def test_enrich_refuses_a_text_without_words() -> None:
+    with pytest.raises(ValueError, match="nothing that can be spoken"):
+        realizer.enrich("```\nonly code\n```")
