@@ -21,6 +21,8 @@ from realizer.playback.scheduled_speech import SPEECH_FADE, ScheduledSpeech
 from realizer.scheduling.timing import Schedule
 from realizer.speech.utterance import Utterance
 
+# Layers that add to the ones below: there, a channel of zeros moves nothing. In others, 0 is a pose.
+ADDED = frozenset({Layer.EXPRESSION, Layer.HEAD, Layer.SPEECH})
 # Rounding of times that are solved again.
 SAME = 1e-9  # s
 
@@ -70,7 +72,7 @@ class PlacedBlock:
     @property
     def plays(self) -> bool:
         """Whether anything of it is heard or moves the face, beside idle motion; plug-ins may do more."""
-        if self.shifts or any(self.channels.values()):
+        if self.shifts or any(map(_moves, self.moving_channels())):
             return True
         if any(node.tag not in VOCABULARY for node in self.block.behaviours):
             return True
@@ -264,3 +266,7 @@ class PlacedBlock:
             since = self.known_since[behaviour]
             for channel in channels:
                 yield KnownMotion(since if channel.crossfade is None else channel.crossfade.at, channel)
+
+
+def _moves(channel: Channel) -> bool:
+    return channel.layer not in ADDED or bool(channel.values.any())
