@@ -54,6 +54,7 @@ CITATION = re.compile(r"\^[^\]]*|[0-9]+(?:\s*[,–-]\s*[0-9]+)*")
 BRACKETS = re.compile(r"\[([^\[\]]{1,60})\]|\(([^()]{1,60})\)")
 # Signs that no one says: what is left of markup, arrows, and a hash before a word.
 UNSAID = re.compile(r"(?<!\S)\|(?!\S)|[→⇒➜]|(?<!\S)(?:-{1,2}|=)>(?!\S)|#(?=[^\W\d])|\\")
+JOINERS = "\ufe0f\u200d"  # that join and colour pictures, and show nothing alone
 NAME = re.compile(r"</?([\w-]+)(:?)")
 
 
@@ -317,6 +318,8 @@ class TextStream:
             shown = of_picture(sign[0]) if PICTURES.fullmatch(sign[0]) else of_emoticon(sign[0])
             if shown is not None and self._emoji:
                 yield shown
+            elif self._emoji and (picture := sign[0].strip(JOINERS)):
+                self.warnings.append(f"the emoji {picture[:8]!r} is not known: it is left out")
             at = sign.end()
         yield _without_signs(text[at:])
 

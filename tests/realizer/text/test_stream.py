@@ -94,3 +94,19 @@ def test_endless_markup_is_read_in_linear_time(unit: str) -> None:
     for at in range(0, len(text), 4096):
         TextStream().feed(text[at : at + 4096], close=True)
     assert time.process_time() - begin < PATIENCE
+
+
+@each_row(
+    "text, warnings",
+    [
+        ("Hello. 🧿 you 🦖", ["'🧿'", "'🦖'"]),
+        ("Hello 🧿", ["'🧿'"]),
+        ("Well 😀 yes \ufe0f", []),
+    ],
+)
+def test_feed_names_emoji_that_are_not_known(text: str, warnings: list[str]) -> None:
+    expected = [f"the emoji {sign} is not known: it is left out" for sign in warnings]
+    assert read(text)[1] == expected
+    stream = TextStream(emoji=False)
+    stream.feed(text, close=True)
+    assert stream.warnings == []
