@@ -146,6 +146,7 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
     odd: list[str] = []
     hidden = 0  # depth inside elements whose text is not spoken
     spelled = [frozenset[str]()]  # what the open elements spell: of <say-as>, outermost first
+    replaced: list[bool] = []  # of the open elements <sub>: whether an alias replaces the text
     reader = expat.ParserCreate()
     reader.buffer_text = True
 
@@ -163,7 +164,12 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
             spelled.append(next((kinds for kinds in (CHARACTERS, DIGITS) if kind in kinds), frozenset()))
             if spelled[-1] is CHARACTERS:
                 parts.append(Tag(name, (("interpret-as", "characters"),)))
+        elif name == "sub" and not attributes.get("alias", "").strip():
+            replaced.append(False)
+            odd.append("<sub> has no alias: its text is spoken")
         elif name in SPOKEN:
+            if name == "sub":
+                replaced.append(True)
             odd.extend(_unsupported(name, attributes))
             kept = ((k, attributes[k][:LONGEST_ATTRIBUTE]) for k in SPOKEN[name] if k in attributes)
             parts.append(Tag(name, tuple(kept)))
@@ -175,7 +181,8 @@ def _parse(ssml: str) -> tuple[list[Part], list[str]]:
         nonlocal hidden
         name = _name(name)
         hidden -= name in HIDDEN
-        if name in SPOKEN and (name != "say-as" or spelled.pop() is CHARACTERS):
+        is_kept = spelled.pop() is CHARACTERS if name == "say-as" else name != "sub" or replaced.pop()
+        if name in SPOKEN and is_kept:
             parts.append(Tag(name, None))
         if name in APART:
             parts.append(" ")

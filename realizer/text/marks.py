@@ -19,14 +19,27 @@ PICTURES = re.compile(
     "[\U0001f000-\U0001faff\u2600-\u27bf\u2b00-\u2bff\u2300-\u23ff\ufe0f\u200d\U000e0020-\U000e007f])+"
 )
 _WORD = re.compile(r"[^\W\d_]+(?:['’][^\W\d_]+)*")
+_SENTENCE_END = re.compile(r"[.!?…。！？؟।][\"'”’»)\]]*\s*$")
+SPEECH = re.compile(
+    r"([^:\"“„«]+)(?::|(?=[\"“„«]))(.*\w.*)", re.DOTALL
+)  # a direction, and what is said in it
 _VOWELS = "aeiou"
 
 
 class Direction(NamedTuple):
-    """What a stage direction shows, and its words that are not known."""
+    """What a stage direction shows.
+
+    Attributes:
+        shows: its behaviours.
+        unknown: its acts that are not known.
+        is_plain: whether each act is a verb with an adverb or a short known tail at most.
+        is_bare: whether an act is in the form of a command or of the past: "smile", "smiled".
+    """
 
     shows: tuple[Tag, ...]
     unknown: str
+    is_plain: bool
+    is_bare: bool
 
 
 def behaviour(name: str) -> Tag:
@@ -43,14 +56,35 @@ def behaviour(name: str) -> Tag:
 def direction(text: str) -> Direction | None:
     """Return what a known stage direction shows: "smiles", "slowly nods", "shakes her head and sighs"."""
     shows, unknown = [], []
+    is_plain, is_bare = True, False
     for act in re.split(r",| and | und | et | y | en ", text.strip(" .!…").lower()):
         words = _WORD.findall(act)
-        name = _shown(words) if len(words) <= LONGEST else None
-        if name is not None:
+        found = _shown(words) if len(words) <= LONGEST else None
+        if found is not None:
+            name, verb, tail = found
             shows.append(behaviour(name))
+            is_plain = is_plain and all(
+                word.endswith("ly") or word in _words("context", "tail") for word in tail
+            )
+            is_bare = is_bare or verb in _bare()
         elif words:
             unknown.append(act.strip())
-    return Direction(tuple(shows), ", ".join(unknown)) if shows else None
+    return Direction(tuple(shows), ", ".join(unknown), is_plain, is_bare) if shows else None
+
+
+def is_direction(found: Direction, before: str, after: str) -> bool:
+    """Return whether emphasised words are a direction: a bare verb is one between sentences only.
+
+    Args:
+        before: the words before it.
+        after: the words after it.
+    """
+    return not found.is_bare or (
+        found.is_plain
+        and (not before.strip() or _SENTENCE_END.search(before) is not None)
+        and not after.lstrip()[:1].islower()
+        and after.lstrip()[:1] not in (*",;:)'’–—-",)
+    )
 
 
 def in_brackets(text: str) -> Tag | None:
@@ -66,7 +100,8 @@ def in_brackets(text: str) -> Tag | None:
 def in_parentheses(text: str) -> Tag | None:
     """Return what words in parentheses show, if they are one stage direction."""
     found = direction(text)
-    return found.shows[0] if found is not None and len(found.shows) == 1 and not found.unknown else None
+    is_one = found is not None and len(found.shows) == 1 and not found.unknown and found.is_plain
+    return found.shows[0] if found is not None and is_one else None
 
 
 def is_third_person(text: str) -> bool:
@@ -84,6 +119,12 @@ def belongs_to_sentence(before: str) -> bool:
     """Return whether emphasised words after this text are part of its sentence."""
     last = _WORD.findall(before[-40:])[-1:]
     return bool(last) and before.rstrip()[-1:].isalpha() and last[0].lower() in _words("context", "before")
+
+
+def is_named(before: str) -> bool:
+    """Return whether a word in brackets after this text is named by it: "the word [sob]"."""
+    last = _WORD.findall(before[-40:])[-1:]
+    return bool(last) and last[0].lower() in _words("context", "names")
 
 
 def element_names(kind: str) -> frozenset[str]:
@@ -118,13 +159,25 @@ def inflections(verb: str) -> tuple[str, ...]:
     return verb, verb + ("es" if verb.endswith(("s", "sh", "ch", "x")) else "s"), f"{stem}ing", f"{stem}ed"
 
 
-def _shown(words: list[str]) -> str | None:
+def _shown(words: list[str]) -> tuple[str, str, list[str]] | None:
+    """Return what an act shows, its verb, and the words after it beside the one that must follow."""
     while len(words) > 1 and (words[0] in _words("context", "subjects") or words[0].endswith("ly")):
         words = words[1:]
     for follows, name in _verbs().get(words[0], ()) if words else ():
         if not follows or follows in words[1:]:
-            return name
+            return name, words[0], [word for word in words[1:] if word != follows]
     return None
+
+
+@cache
+def _bare() -> frozenset[str]:
+    """Return the forms of English verbs that are no third person and no participle."""
+    forms = [
+        inflections(phrase.partition("+")[0])
+        for row in toml_table(FILE)["en"].values()
+        for phrase in row.split()
+    ]
+    return frozenset(form for bare, _, _, past in forms for form in (bare, past))
 
 
 @cache

@@ -16,6 +16,7 @@ BEGUN = re.compile(  # a tag whose end is missing
 )
 _BLANKS = re.compile(r"\s{2,}|[^\S ]")
 _BEFORE_SIGN = re.compile(r"[ \n]+([.,;!?](?![\w.]))")
+_WORD_END = re.compile(r"[\w.,;:!?…]\w")  # words that only a behaviour keeps apart
 _ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;"})
 
 
@@ -54,7 +55,9 @@ def tidy(parts: Iterable[Part]) -> list[Part]:
         if isinstance(part, str):
             part = _BEFORE_SIGN.sub(r"\1", _BLANKS.sub(_single, part))
             part = part.lstrip() if end.isspace() else part
-            if part[:1] in ".,;:!?" and end == " ":
+            if found and isinstance(last := found[-1], Tag) and last.shows and _WORD_END.match(end + part):
+                part = f" {part}"
+            if part and part[0] in ".,;:!?" and end == " ":
                 place = max(k for k, one in enumerate(found) if isinstance(one, str))
                 found[place] = str(found[place]).rstrip(" ")
             end = part[-1:] or end

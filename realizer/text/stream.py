@@ -19,12 +19,15 @@ from realizer.text.markdown import (
 )
 from realizer.text.marks import (
     PICTURES,
+    SPEECH,
     belongs_to_sentence,
     direction,
     element_names,
     emoticons,
     in_brackets,
     in_parentheses,
+    is_direction,
+    is_named,
     is_third_person,
     of_emoticon,
     of_picture,
@@ -281,8 +284,15 @@ class TextStream:
         """Return the behaviours of a stage direction, or else emphasised words."""
         if belongs_to_sentence(self._before):
             return self._words(text)
+        speech = SPEECH.fullmatch(text)
+        if speech is not None:
+            head = direction(speech[1])
+            if is_third_person(speech[1]) if head is None else not head.is_bare:
+                return (*self._emphasised(speech[1], ()), " ", *self._words(speech[2]))
         known = direction(text)
         if known is not None:
+            if not is_direction(known, self._before, _after(following)):
+                return self._words(text)
             if known.unknown:
                 self.warnings.append(f"the stage direction {known.unknown!r} is not known: it is left out")
             return known.shows
@@ -303,6 +313,8 @@ class TextStream:
         for found in BRACKETS.finditer(text):
             inside = found[1] or found[2]
             shown = in_brackets(inside) if found[1] else in_parentheses(inside)
+            if shown is not None and found[1] and is_named(self._before + text[: found.start()]):
+                continue
             if shown is not None or (found[1] and CITATION.fullmatch(inside)):
                 parts += [text[at : found.start()], *(() if shown is None else (shown,))]
                 at = found.end()
@@ -319,7 +331,9 @@ class TextStream:
             if shown is not None and self._emoji:
                 yield shown
             elif self._emoji and (picture := sign[0].strip(JOINERS)):
-                self.warnings.append(f"the emoji {picture[:8]!r} is not known: it is left out")
+                self.warnings.append(f"the emoji '{picture[:8]}' is not known: it is left out")
+            if shown is None or not self._emoji:
+                yield " "
             at = sign.end()
         yield _without_signs(text[at:])
 
@@ -355,7 +369,20 @@ def _segment(text: str, begin: int, tried: Tried, *, closed: bool) -> tuple[int,
 def _wants_next(pieces: Sequence[Piece]) -> bool:
     """Return whether what follows decides if the last piece is a stage direction."""
     last = [piece for piece in pieces if piece.text.strip()][-1:]
-    return bool(last) and last[0].kind == "em" and is_third_person(last[0].text)
+    if not last or last[0].kind != "em":
+        return False
+    known = direction(last[0].text)
+    return is_third_person(last[0].text) or (known is not None and known.is_bare)
+
+
+def _after(following: Sequence[Piece]) -> str:
+    """Return the words after a direction; another direction ends them."""
+    after = ""
+    for piece in following:
+        if piece.kind == "em" and direction(piece.text) is not None:
+            break
+        after += "" if piece.kind == "tag" else piece.text
+    return after
 
 
 def _first_blank(text: str, start: int, most: int, *, closed: bool) -> int | None:

@@ -29,10 +29,13 @@ const UNSAID = /(?<!\S)\|(?!\S)|[→⇒➜]|(?<!\S)(?:-{1,2}|=)>(?!\S)|#(?=\p{L}
 const PICTURES =
   /(?:[0-9#*]\ufe0f?\u20e3|[©®™‼⁉]\ufe0f|[\u{1f000}-\u{1faff}\u2600-\u27bf\u2b00-\u2bff\u2300-\u23ff\ufe0f\u200d\u{e0020}-\u{e007f}])+/gu;
 const WORD = /\p{L}+(?:['’]\p{L}+)*/gu;
+const SENTENCE_END = /[.!?…。！？؟।]["'”’»)\]]*\s*$/;
+const SPEECH = /^([^:"“„«]+)(?::|(?=["“„«]))([^]*[\p{L}\p{N}_][^]*)$/u; // a direction, and what is said in it
+const WORD_END = /^[\p{L}\p{N}_.,;:!?…][\p{L}\p{N}_]/u; // words that only a behaviour keeps apart
 const VOWELS = "aeiou";
 
 const words = (text) => new Set(text.split(" ").filter(Boolean));
-const words_ = { before: words(marks.context.before), subjects: words(marks.context.subjects), never: words(marks.context.never) };
+const words_ = Object.fromEntries(Object.entries(marks.context).map(([kind, all]) => [kind, words(all)]));
 const elements = Object.fromEntries(Object.entries(names).map(([kind, all]) => [kind, words(all)]));
 const feelings = { pause: "pause" };
 for (const [name, alike] of Object.entries(marks.emotions.alike)) for (const word of words(alike)) feelings[word] = name;
@@ -59,6 +62,14 @@ for (const language of ["en", "de", "fr", "es", "nl"]) {
       const [verb, follows = ""] = phrase.split("+");
       for (const form of language === "en" ? inflections(verb) : [verb]) verbs.set(form, [...(verbs.get(form) ?? []), [follows, name]]);
     }
+  }
+}
+
+const bare = new Set(); // forms of English verbs that are no third person and no participle
+for (const phrases of Object.values(marks.en)) {
+  for (const phrase of phrases.split(" ")) {
+    const [verb, , , past] = inflections(phrase.split("+")[0]);
+    bare.add(verb).add(past);
   }
 }
 
@@ -170,8 +181,7 @@ class Reader {
 
   #say(pieces) {
     for (const [place, { kind, text }] of pieces.entries()) {
-      const following = () => pieces.slice(place + 1).map((one) => (one.kind === "tag" ? "" : one.text)).join("");
-      const parts = kind === "em" ? this.#emphasised(text, following()) : kind === "tag" ? element(text) : kind === "code" ? [text] : this.#words(text);
+      const parts = kind === "em" ? this.#emphasised(text, pieces.slice(place + 1)) : kind === "tag" ? element(text) : kind === "code" ? [text] : this.#words(text);
       for (const part of parts) if (typeof part === "string") this.#before = (this.#before + part).slice(-BEFORE);
       this.#parts.push(...parts);
     }
@@ -181,11 +191,18 @@ class Reader {
   #emphasised(text, following) {
     const last = this.#before.slice(-40).match(WORD)?.at(-1);
     if (last && /\p{L}$/u.test(this.#before.trimEnd()) && words_.before.has(last.toLowerCase())) return this.#words(text);
+    const speech = SPEECH.exec(text);
+    if (speech) {
+      const head = direction(speech[1]);
+      if (head ? !head.isBare : isThirdPerson(speech[1])) return [...this.#emphasised(speech[1], []), " ", ...this.#words(speech[2])];
+    }
     const known = direction(text);
+    if (known && !isDirection(known, this.#before, wordsAfter(following))) return this.#words(text);
     if (known?.unknown) this.warnings.push(`the stage direction '${known.unknown}' is not known: it is left out`);
     if (known) return known.shows;
     const standsAlone = !this.#before.trim() || ENDED.test(this.#before);
-    if (standsAlone && isThirdPerson(text) && !/^\p{Ll}/u.test(following.trimStart())) {
+    const after = following.map((piece) => (piece.kind === "tag" ? "" : piece.text)).join("");
+    if (standsAlone && isThirdPerson(text) && !/^\p{Ll}/u.test(after.trimStart())) {
       this.warnings.push(`the stage direction '${text.slice(0, 60)}' is not known: it is left out`);
       return [];
     }
@@ -198,6 +215,7 @@ class Reader {
     let at = 0;
     for (const found of text.matchAll(BRACKETS)) {
       const shown = found[1] !== undefined ? inBrackets(found[1]) : inParentheses(found[2]);
+      if (shown && found[1] !== undefined && isNamed(this.#before + text.slice(0, found.index))) continue;
       if (!shown && !(found[1] !== undefined && CITATION.test(found[1]))) continue;
       parts.push(...this.#signs(text.slice(at, found.index)), ...(shown ? [shown] : []));
       at = found.index + found[0].length;
@@ -214,7 +232,9 @@ class Reader {
     let at = 0;
     for (const [index, sign, name] of found) {
       parts.push(withoutSigns(text.slice(at, index)));
-      if (name && this.emoji) parts.push(behaviour(name));
+      const unknown = name ? "" : sign.replace(/^[\ufe0f\u200d]+|[\ufe0f\u200d]+$/gu, "");
+      if (unknown && this.emoji) this.warnings.push(`the emoji '${[...unknown].slice(0, 8).join("")}' is not known: it is left out`);
+      parts.push(name && this.emoji ? behaviour(name) : " ");
       at = index + sign.length;
     }
     return [...parts, withoutSigns(text.slice(at))];
@@ -293,19 +313,42 @@ function behaviour(name) {
 function direction(text) {
   const shows = [];
   const unknown = [];
+  let isPlain = true; // whether each act is a verb with an adverb or a short known tail at most
+  let isBare = false; // whether an act is in the form of a command or of the past
   for (const act of text.replace(/^[ .!…]+|[ .!…]+$/g, "").toLowerCase().split(/,| and | und | et | y | en /)) {
     const said = act.match(WORD) ?? [];
-    const name = said.length <= LONGEST_DIRECTION ? shownBy(said) : null;
-    if (name) shows.push(behaviour(name));
-    else if (said.length) unknown.push(act.trim());
+    const found = said.length <= LONGEST_DIRECTION ? shownBy(said) : null;
+    if (found) {
+      shows.push(behaviour(found.name));
+      isPlain &&= found.tail.every((word) => word.endsWith("ly") || words_.tail.has(word));
+      isBare ||= bare.has(found.verb);
+    } else if (said.length) unknown.push(act.trim());
   }
-  return shows.length ? { shows, unknown: unknown.join(", ") } : null;
+  return shows.length ? { shows, unknown: unknown.join(", "), isPlain, isBare } : null;
+}
+
+/** Whether emphasised words are a direction: a bare verb is one between sentences only. */
+function isDirection(found, before, after) {
+  const ends = !before.trim() || SENTENCE_END.test(before);
+  return !found.isBare || (found.isPlain && ends && !/^\s*[\p{Ll},;:)'’–—-]/u.test(after));
+}
+
+/** The words after a direction; another direction ends them. */
+function wordsAfter(following) {
+  const end = following.findIndex((piece) => piece.kind === "em" && direction(piece.text));
+  return following.slice(0, end < 0 ? undefined : end).map((piece) => (piece.kind === "tag" ? "" : piece.text)).join("");
+}
+
+/** Whether a word in brackets after this text is named by it: "the word [sob]". */
+function isNamed(before) {
+  const last = before.slice(-40).match(WORD)?.at(-1);
+  return last !== undefined && words_.names.has(last.toLowerCase());
 }
 
 function shownBy(said) {
   while (said.length > 1 && (words_.subjects.has(said[0]) || said[0].endsWith("ly"))) said = said.slice(1);
   const found = (verbs.get(said[0]) ?? []).find(([follows]) => !follows || said.slice(1).includes(follows));
-  return found?.[1] ?? null;
+  return found ? { name: found[1], verb: said[0], tail: said.slice(1).filter((word) => word !== found[0]) } : null;
 }
 
 function inBrackets(text) {
@@ -318,7 +361,7 @@ function inBrackets(text) {
 
 function inParentheses(text) {
   const found = direction(text);
-  return found && found.shows.length === 1 && !found.unknown ? found.shows[0] : null;
+  return found && found.shows.length === 1 && !found.unknown && found.isPlain ? found.shows[0] : null;
 }
 
 function isThirdPerson(text) {
@@ -372,6 +415,7 @@ function tidy(parts) {
       part = part.replace(/\s{2,}|[^\S ]/g, (blanks) => ["", "\n"][blanks.split("\n").length - 1] || (blanks.includes("\n") ? "\n\n" : " "));
       part = part.replace(/[ \n]+([.,;!?](?![\p{L}\p{N}_.]))/gu, "$1");
       if (/^\s$/.test(end)) part = part.trimStart();
+      if (found.at(-1)?.shows && WORD_END.test(end + part)) part = ` ${part}`;
       if (end === " " && /^[.,;:!?]/.test(part)) {
         const place = found.findLastIndex((one) => typeof one === "string");
         found[place] = found[place].replace(/ +$/, "");

@@ -8,6 +8,7 @@ from realizer.core.errors import VoiceError
 from realizer.speech.espeak.document import write_document
 from realizer.speech.ssml import MAX_TEXT, Break, Mark, Tag, read_script
 from realizer.speech.utterance import SpeechRequest
+from realizer.speech.words import WordToken, tokens
 from tests.rows import each_row
 
 
@@ -71,6 +72,14 @@ def test_read_script_reads_bml_syncs_as_marks() -> None:
 def test_read_script_warns_of_a_mark_without_a_name(mark: str) -> None:
     script = read_script(SpeechRequest(f"one {mark}two"))
     assert (script.marks, script.warnings) == ((), ("a mark without a name is ignored",))
+
+
+@pytest.mark.parametrize("tag", ["<sub>", '<sub alias="">', '<sub alias=" ">'])
+def test_read_script_speaks_the_text_of_sub_without_an_alias(tag: str) -> None:
+    script = read_script(SpeechRequest(f'one {tag}two <sub alias="x">y</sub></sub> 3'))
+    alias = Tag("sub", (("alias", "x"),))
+    assert script.parts == ("one two ", alias, "y", Tag("sub", None), " 3")
+    assert script.warnings == ("<sub> has no alias: its text is spoken",)
 
 
 def test_read_script_limits_the_length() -> None:
