@@ -8,7 +8,6 @@ from realizer.core.errors import VoiceError
 from realizer.speech.espeak.document import write_document
 from realizer.speech.ssml import MAX_TEXT, Break, Mark, Tag, read_script
 from realizer.speech.utterance import SpeechRequest
-from realizer.speech.words import WordToken, tokens
 from tests.rows import each_row
 
 
