@@ -29,7 +29,8 @@ def at_given_times(said: Utterance, given: GivenTimes) -> Utterance:
     """Return what a voice said, stretched to the marks and the end of given times, with their visemes."""
     return Utterance(
         duration=said.duration or given.duration,
-        words=given.words or said.words,
+        # Times may be given for a part of the words.
+        words=given.words if _letters(given.words) == _letters(said.words) else said.words or given.words,
         # Visemes may be given for a part of the words.
         phonemes=(*given.phonemes, *(p for p in said.phonemes if p.start >= given.last)),
         marks={**said.marks, **given.marks},
@@ -37,6 +38,10 @@ def at_given_times(said: Utterance, given: GivenTimes) -> Utterance:
         pcm=said.pcm,
         warnings=said.warnings,
     )
+
+
+def _letters(words: tuple[Word, ...]) -> str:
+    return "".join(filter(str.isalnum, "".join(word.text for word in words))).casefold()
 
 
 @lru_cache(CACHED)

@@ -64,3 +64,9 @@ def test_given_times_without_words_are_an_utterance_without_sound() -> None:
     silent = at_given_times(Utterance(0.0, (), (), {}), given)
     assert (silent.duration, silent.phonemes, silent.pcm) == (1, given.phonemes, None)
     assert GivenTimes({}, unknown=("zork",)).warnings == ("visemes without a mouth shape: zork",)
+
+
+def test_words_without_times_are_kept() -> None:
+    given = GivenTimes({"b": 0.5, "c": 1.0}, (Word(0.5, 1.0, "two"),))
+    said = speak_to_length(SilentVoice(), SpeechRequest("one <mark name='b'/>two", ("b",), given=given))
+    assert [word.text for word in said.words] == ["one", "two"]
