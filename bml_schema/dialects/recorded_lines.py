@@ -19,6 +19,7 @@ from bml_schema.reading.undeclared_prefixes import remove_element
 from bml_schema.values import NUMBER, decimal
 
 _SOUND = "audio"
+FASTEST, SLOWEST = 0.05, 6.0  # s for a word of a recorded line
 _CURVE_AU = re.compile(r"(?:facs_)?au_?(\d{1,3})(?:_(left|right|both))?", re.IGNORECASE)
 # Parts of the name of a curve, the action units of its positive and negative values, and their degrees at 1.
 # Angles turn about the axes to the left, up and forward: positive is down, to the left, and tilted right.
@@ -59,7 +60,12 @@ def read_recorded_lines(root: Any, apply: Callable[[Row], None]) -> None:
 def _read_speech(speech: Any, lips: list[Any], apply: Callable[[Row], None]) -> None:
     begin = _seconds(speech.get("start")) or 0.0
     recorded = etree.Element(own("recorded"))
-    for mark, until, words in _timed_words(speech):
+    timed = _timed_words(speech)
+    if not _is_plausible(speech, timed):
+        for mark in speech.iterfind("{*}text/{*}sync[@time]"):
+            apply(Row("SmartBody", "sync", "time", mark.attrib.pop("time"), "-", ""))
+        timed = []
+    for mark, until, words in timed:
         etree.SubElement(recorded, own("mark"), name=mark.get("id", ""), time=mark.attrib.pop("time"))
         if words:
             start = recorded[-1].get("time", "0")
@@ -69,9 +75,12 @@ def _read_speech(speech: Any, lips: list[Any], apply: Callable[[Row], None]) -> 
         apply(Row("SmartBody", "sync", "time", "", "the times of the words", ""))
         for point in [name for name in speech.attrib if name in ("ready", "stroke", "relax", "end")]:
             apply(Row("SmartBody", "speech", point, speech.attrib.pop(point), "-", ""))
+    # Fewer would be heard as fast as nobody speaks: they are not those of the whole text.
+    ends = [_seconds(element.get("end")) or 0.0 for element in lips]
+    spoken = lips and max(ends) - begin >= FASTEST * len(_words(speech))
     for element in lips:
         first, last = _seconds(element.get("start")), _seconds(element.get("end"))
-        if first is not None and last is not None and last > first:
+        if spoken and first is not None and last is not None and last > first:
             times = {"start": decimal(max(first - begin, 0.0)), "end": decimal(max(last - begin, 0.0))}
             amount = element.get("articulation") or "1"
             etree.SubElement(recorded, own("viseme"), times, name=element.get("viseme"), amount=amount)
@@ -92,12 +101,33 @@ def _read_speech(speech: Any, lips: list[Any], apply: Callable[[Row], None]) -> 
         description.append(etree.fromstring(canonical(recorded)))
 
 
-def _timed_words(speech: Any) -> Iterator[tuple[Any, str, str]]:
-    """Yield (sync, time of the next one or "", words up to it) of each sync with a time."""
+def _timed_words(speech: Any) -> list[tuple[Any, str, str]]:
+    """Return (sync, time of the next one or "", words up to it) of each sync with a time."""
     syncs = [s for s in speech.iterfind("{*}text/{*}sync") if _seconds(s.get("time")) is not None]
     ends = [*(sync.get("time", "") for sync in syncs), ""][1:]
-    for sync, until in zip(syncs, ends, strict=False):
-        yield sync, until, " ".join((sync.tail or "").split())
+    return [
+        (sync, until, " ".join((sync.tail or "").split())) for sync, until in zip(syncs, ends, strict=False)
+    ]
+
+
+def _words(speech: Any) -> list[str]:
+    return [word for text in speech.iterfind("{*}text") for word in "".join(text.itertext()).split()]
+
+
+def _is_plausible(speech: Any, timed: list[tuple[Any, str, str]]) -> bool:
+    """Return whether times can be those of all words of a speech: else it is spoken by the voice's own."""
+    times = [_seconds(sync.get("time")) or 0.0 for sync, _, _ in timed]
+    words = _words(speech)
+    return (
+        len(timed) == len(list(speech.iterfind("{*}text/{*}sync[@time]")))
+        and min(times, default=0.0) >= 0
+        and times == sorted(times)
+        and all(
+            float(until or "-inf") > at for at, (_, until, said) in zip(times, timed, strict=True) if said
+        )
+        and " ".join(said for *_, said in timed if said).split() == words
+        and (not timed or FASTEST * len(words) <= times[-1] - times[0] <= SLOWEST * (len(words) + 10))
+    )
 
 
 def _seconds(text: str | None) -> float | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import realizer
-from bml_schema import Block, FaceKeyframe, Speech, read
+from bml_schema import Block, FaceKeyframe, Speech, parse, read
 from bml_schema.nodes import RECORDED
 from realizer.animation.axis import AU_NAMES
 from realizer.speech.silent import SilentVoice
@@ -138,3 +138,35 @@ def test_lines_without_times_stay_as_they_are() -> None:
     assert not block["s"].descriptions
     assert not block.problems
     assert np.isfinite(realizer.schedule('<bml id="b"><lips/></bml>', voice="silent").duration)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Good <sync id='T1' time='99999'/>day",
+        "Good <sync id='T1' time='0.3'/>day <sync id='T2' time='0.6'/>",
+        "<sync id='T0' time='0'/>Good <sync id='T1' time='0.5'/>day <sync id='T2' time='0.1'/>",
+        "<sync id='T0' time='0'/>Good <sync id='T1' time='abc'/>day<sync id='T2' time='1'/>",
+        "<sync id='T0' time='0'/>Good <sync id='T1' time='0'/>day<sync id='T2' time='0'/>",
+        "<sync id='T0' time='-3'/>Good <sync id='T1' time='0.5'/>day<sync id='T2' time='1'/>",
+    ],
+)
+def test_times_that_cannot_be_those_of_all_words_are_given_up_and_named(text: str) -> None:
+    block = parse(f"<bml id='b'><speech id='s'><text>{text}</text></speech></bml>")
+    (speech,) = block.behaviours
+    assert isinstance(speech, Speech)
+    assert speech.text is not None
+    assert (
+        " ".join("".join(part for part in speech.text.parts if isinstance(part, str)).split()) == "Good day"
+    )
+    assert not [form for form in speech.descriptions if form.type == RECORDED]
+    assert "without <sync time=" in block.problems[0].text
+
+
+def test_lips_too_short_for_the_words_are_given_up_and_named() -> None:
+    lips = "<lips viseme='BMP' articulation='1' start='0' end='0.07'/>"
+    block = parse(f"<bml id='b'><speech id='s'><text>Good day to you</text></speech>{lips}</bml>")
+    (speech,) = block.behaviours
+    assert isinstance(speech, Speech)
+    assert not [form for form in speech.descriptions if form.type == RECORDED]
+    assert 'without <lips viseme="BMP">' in block.problems[0].text
