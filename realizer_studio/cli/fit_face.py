@@ -46,10 +46,10 @@ def fit_face(
     --deformer au draws a face with the extended form. After `realizer faces build`, use --data to measure the
     new shapes.
     """
-    from realizer.face.au.file import write_model
     from realizer.face.load import folder_of, load_face
     from realizer_studio.faces.au.fit_limits import runaways
     from realizer_studio.faces.au.measure import read_measurements, read_shapes, write_shapes
+    from realizer_studio.faces.au.model_file import write_model
     from realizer_studio.faces.au.unit_fit import fit_models, left_out_text, table, table_text
 
     if measurements and data:

@@ -17,7 +17,7 @@ from realizer.animation.frames import AUFrames
 from realizer.core.array_types import Float64
 from realizer.core.errors import FaceError
 from realizer.face.au.deformer import LIDS, displacements, side_names
-from realizer.face.au.file import read_model, write_model
+from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.au.regions import fit_mouth, shares
 from realizer.face.au.units import units
@@ -28,6 +28,7 @@ from realizer.face.model import Face
 from realizer.tables import action_units
 from realizer_studio.faces.au.fit_limits import runaways
 from realizer_studio.faces.au.measure import COLLAR, OPEN, UnitMeasurement, read_shapes, write_shapes
+from realizer_studio.faces.au.model_file import write_model
 from realizer_studio.faces.au.unit_fit import FORMS, MOVES, fit_models, table, table_text
 
 SHAPES = "au_shapes.npz"

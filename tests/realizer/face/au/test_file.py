@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from realizer.core.errors import FaceError
-from realizer.face.au.file import read_model, write_model
+from realizer.face.au.file import read_model
 from realizer.face.load import load_face
+from realizer_studio.faces.au.model_file import write_model
 from tests.shipped import FACES, FOLDERS
 
 

@@ -10,12 +10,13 @@ import pytest
 from click.testing import CliRunner
 
 from realizer.core.errors import FaceError
-from realizer.face.au.file import read_model, write_model
+from realizer.face.au.file import read_model
 from realizer.face.au.model import Model
 from realizer.face.load import list_faces, load_face
 from realizer.face.model import Face
 from realizer_studio.faces.au.fit_limits import FURTHEST, monitored_points, overshoot, runaways
 from realizer_studio.faces.au.measure import UnitMeasurement, read_shapes
+from realizer_studio.faces.au.model_file import write_model
 from realizer_studio.faces.au.unit_fit import fit_models
 
 pytestmark = pytest.mark.xdist_group("fits")
