@@ -483,7 +483,7 @@ def test_stomp_begins_a_new_session_after_one_that_fails(caplog) -> None:
         link = transport_of(server)._links[0]
         link.receive(WAIT.format("b", 60))
         (session,) = server._sessions._registry.sessions.values()
-        server._sessions._fail(session)
+        server._sessions._end(session, 1011, "internal error")
         assert server._sessions.health() == {"sessions": 0, "connections": 0}
         for id in ("c", "d"):
             link.receive(WAIT.format(id, 60))
