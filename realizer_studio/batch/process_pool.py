@@ -124,7 +124,7 @@ class _WorkerProcess:
 
 @contextlib.contextmanager
 def _signals_held() -> Iterator[None]:
-    """Let SIGINT and SIGTERM wait until the end of the block."""
+    """Hold SIGINT and SIGTERM until the end of the block."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread has handlers
         return

@@ -218,7 +218,7 @@ def _check_options(message: Subscribe) -> None:
 
 
 def _go_on(new: Subscription, old: Subscription) -> None:
-    """Let a subscription begin where another one was; rows that were sent ahead are sent again."""
+    """Begin a subscription where another one was; rows that were sent ahead are sent again."""
     if isinstance(new, AheadSubscription) and isinstance(old, AheadSubscription):
         new.takes_back = old.takes_back or old.next > old.final
         new.next = new.final = max(new.final, old.final)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import gc
 import json
 import re
 import selectors
 import weakref
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 
 import pytest
@@ -423,17 +422,6 @@ def test_session_host_closes_clients_of_a_taken_session(in_tiny_slices, tmp_path
 
     with asyncio.Runner(loop_factory=Loop) as runner:
         runner.run(run())
-
-
-@pytest.fixture
-def no_automatic_gc() -> Iterator[None]:
-    """Python looks for no cycles while a test counts them."""
-    was = gc.isenabled()
-    gc.collect()
-    gc.disable()
-    yield
-    if was:
-        gc.enable()
 
 
 @pytest.mark.usefixtures("no_automatic_gc")
